@@ -42,6 +42,7 @@ LINE_SOURCE = {"FIXED": 0, "POINT": 1, "DEPTH": 2}
 LINE_SURFACE = {"SHOWN": 0, "PAPER": 1, "NONE": 2}
 WRAP = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2}
 ALPHA = {"NONE": 0, "CLIP": 1, "BLEND": 2}
+KEYS_KIND = {"PART": 1, "NEXT": 2}
 FIELD_SOURCE = {"VALUES": 0, "SCALAR": 1, "LUMINANCE": 2, "CLASSES": 3, "DISTANCE": 4, "UNCERTAINTY": 5, "DENSITY": 6}
 FIELD_SHAPE = {"FROM_POINT": 0, "FROM_PLANE": 1, "FROM_AXIS": 2}
 
@@ -231,6 +232,15 @@ class MeshStyle(Descriptor):
                 ("alpha_least", c_float), ("exact", c_uint32)]
 
 
+class Part(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("part", c_uint32), ("of", c_uint32), ("behind", c_char_p), ("note", c_char_p)]
+
+
+class KeysInfo(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("kind", c_uint32), ("part", c_uint32), ("of", c_uint32), ("round", c_uint32),
+                ("engine", c_char * 32), ("picture", c_uint64), ("note_size", c_uint64)]
+
+
 class ScanGrade(Structure):
     _fields_ = [("gain", c_float), ("gamma", c_float), ("saturation", c_float), ("temperature", c_float)]
 
@@ -338,6 +348,10 @@ CALLS = {
     "patina_texture_create": (POINTER(TextureDesc), POINTER(c_void_p)),
     "patina_texture_destroy": (c_void_p,),
     "patina_scene_add_mesh": (c_void_p, c_void_p, POINTER(MeshStyle)),
+    "patina_frame_scatter": (c_void_p, c_void_p, POINTER(Part), c_char_p),
+    "patina_frame_merge": (c_void_p, c_void_p, POINTER(c_void_p), c_uint32, c_char_p, c_void_p),
+    "patina_keys_get_info": (c_char_p, POINTER(KeysInfo)),
+    "patina_keys_read_note": (c_char_p, c_char_p, c_size_t),
     "patina_mask_create": (c_void_p, c_void_p, c_void_p, c_size_t, POINTER(c_void_p)),
     "patina_mask_destroy": (c_void_p,),
     "patina_grade_create": (c_void_p, c_void_p, POINTER(ScanGrade), c_uint32, POINTER(c_void_p)),

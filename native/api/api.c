@@ -5,18 +5,13 @@
 #include "run/frame_samples.h"
 #include "base/descriptor.h"
 #include "base/progress.h"
+#include "base/version.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define TEXT_(x) #x
-#define TEXT(x) TEXT_(x)
-
-const char *patina_version(void)
-{
-    return TEXT(PATINA_VERSION_MAJOR) "." TEXT(PATINA_VERSION_MINOR) "." TEXT(PATINA_VERSION_PATCH);
-}
+const char *patina_version(void) { return PT_VERSION; }
 
 static int fail(const char *what) { return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s", what); }
 
@@ -168,6 +163,68 @@ int patina_frame_refine(patina_frame *frame, const patina_scene *scene, double m
         return fail("patina_frame_refine: frame or scene is NULL, or ms is not a number");
     int error = take_turn(frame);
     return error ? error : end_turn(frame, pt_frame_refine(frame, scene, ms));
+}
+
+int patina_frame_scatter(patina_frame *frame, const patina_scene *scene, const patina_part *part, const char *path)
+{
+    patina_part checked;
+    if (!frame || !scene || !part || !path)
+        return fail("patina_frame_scatter: frame, scene, part or path is NULL");
+    int error = pt_take(&frame->handle, "patina_frame_scatter", part, &checked, sizeof checked);
+    if (!error && (!checked.part || checked.part > checked.of || checked.of > 65536))
+        error = pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_scatter: there is no part %u of %u", checked.part,
+                        checked.of);
+    error = error ? error : take_turn(frame);
+    return error ? error : end_turn(frame, pt_frame_scatter(frame, scene, &checked, path));
+}
+
+int patina_frame_merge(patina_frame *frame, const patina_scene *scene, const char *const *paths, uint32_t count,
+                       const char *next, uint32_t *round)
+{
+    if (!frame || !scene || !round || (count && !paths))
+        return fail("patina_frame_merge: frame, scene, paths or round is NULL");
+    for (uint32_t i = 0; i < count; i++)
+        if (!paths[i])
+            return fail("patina_frame_merge: a path is NULL");
+    int error = take_turn(frame);
+    return error ? error : end_turn(frame, pt_frame_merge(frame, scene, paths, count, next, round));
+}
+
+int patina_keys_get_info(const char *path, patina_keys_info *info)
+{
+    struct pt_key_file file;
+    if (!path)
+        return fail("patina_keys_get_info: path is NULL");
+    int error = pt_key_file_open(&file, NULL, path);
+    if (error)
+        return error;
+    patina_keys_info told = {.struct_size = sizeof told,
+                             .kind = file.head.kind,
+                             .part = file.head.part,
+                             .of = file.head.of,
+                             .round = file.head.round,
+                             .picture = file.head.picture,
+                             .note_size = file.head.note_size};
+    memcpy(told.engine, file.head.engine, sizeof told.engine);
+    pt_key_file_close(&file);
+    return pt_give(NULL, "patina_keys_get_info", &told, sizeof told, info);
+}
+
+int patina_keys_read_note(const char *path, char *note, size_t size)
+{
+    struct pt_key_file file;
+    if (!path || !note)
+        return fail("patina_keys_read_note: path or note is NULL");
+    int error = pt_key_file_open(&file, NULL, path);
+    if (error)
+        return error;
+    if (size == file.head.note_size + 1)
+        memcpy(note, file.note, size);
+    else
+        error = pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_keys_read_note: %s: the note takes %llu bytes; got %zu", path,
+                        (unsigned long long)file.head.note_size + 1, size);
+    pt_key_file_close(&file);
+    return error;
 }
 
 int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene)

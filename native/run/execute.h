@@ -6,6 +6,7 @@
 
 #include "binder.h"
 #include "layers.h"
+#include "merge.h"
 #include "times.h"
 
 struct pt_execution {
@@ -13,6 +14,7 @@ struct pt_execution {
     const struct patina_scene *scene;
     struct pt_plan *plan; // the places of its lights' maps are found once a light's turn comes
     struct pt_binder binder;
+    struct pt_merge *merge; // NULL: points are scattered here
     struct pt_times *times;
     const atomic_int *cancel;
     _Atomic float *progress;             // NULL: nobody looks

@@ -9,6 +9,7 @@
 #include "times.h"
 
 struct pt_mean;
+struct pt_merge;
 
 // What readers are told of the last finished render. The planes of its picture go with it.
 struct pt_shown {
@@ -40,6 +41,7 @@ struct patina_frame {
     float progress_done, progress_share; // of the render: before the picture at hand, and by it
     uint32_t sampling[2];                // of the last picture: grid and shifts of its samples
     struct pt_mean *mean;                // while samples of the last picture are pending
+    struct pt_merge *merge;              // while parts are merged; NULL: points are scattered here
     struct pt_times times;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
@@ -67,6 +69,10 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder);
 int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene);
 // What arrives of the light at each point of the instance.
 int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size);
+// frame_part.c: as patina_frame_scatter and patina_frame_merge say.
+int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scene, const patina_part *part, const char *path);
+int pt_frame_merge(struct patina_frame *frame, const struct patina_scene *scene, const char *const *paths, uint32_t count,
+                   const char *next, uint32_t *round);
 // frame_shadow_file.c
 int pt_frame_save_shadows(const struct patina_frame *frame, const char *path);
 int pt_frame_load_shadows(struct patina_frame *frame, const struct patina_scene *scene, const char *path);

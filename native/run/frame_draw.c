@@ -80,6 +80,7 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
     struct pt_execution execution = {.device = frame->device,
                                      .scene = scene,
                                      .plan = plan,
+                                     .merge = frame->merge,
                                      .times = &frame->times,
                                      .cancel = &frame->cancel,
                                      .progress = &frame->progress,
@@ -116,6 +117,8 @@ int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
     const double start = pt_milliseconds();
     int error = pt_plan_create(scene, &plan);
     if (!error && (error = pt_frame_number(frame, scene)))
+        pt_plan_destroy(&plan);
+    if (!error && frame->merge && (error = pt_merge_begin(frame->merge, scene, &plan)))
         pt_plan_destroy(&plan);
     if (error)
         return pt_fail_again(&frame->handle, error);

@@ -19,6 +19,8 @@ static int run_plan(struct pt_execution *e, struct pt_plan *plan)
     struct pt_execution inner = {.device = e->device,
                                  .scene = e->scene,
                                  .plan = plan,
+                                 .merge = e->merge,
+                                 .round = e->round,
                                  .times = e->times,
                                  .cancel = e->cancel,
                                  .binder = {.device = e->device,

@@ -29,6 +29,12 @@ static int arguments_of(struct pt_execution *e, uint32_t i, const void **out)
 static int run_pass(struct pt_execution *e, uint32_t i)
 {
     const struct pt_pass *pass = &e->plan->passes[i];
+    if (e->merge && pt_is_of_parts(pass)) {
+        const int taken = pt_merge_take(e->merge, &e->binder, e->scene, pass, &e->round);
+        if (taken || pass->kernel == PT_KERNEL_scatter)
+            return taken;
+        // what discs show follows: those before the settled depths are found once more, and no key changes
+    }
     const void *arguments;
     struct pt_buffer *few[16], **bound = pass->ref_count <= 16 ? few : calloc(pass->ref_count, sizeof *bound);
     int error = bound ? arguments_of(e, i, &arguments)

@@ -159,10 +159,36 @@ static int take_scalars(const patina_file *file, const char *name, patina_cloud 
     return code;
 }
 
+// A built cloud, which patina_cloud_save wrote.
+static int is_saved(const char *path)
+{
+    char start[8] = "";
+    FILE *file = pt_stream_open(path, "rb");
+    const int read = file && fread(start, sizeof start, 1, file) == 1;
+    if (file)
+        fclose(file);
+    return read && !memcmp(start, "patina\n\x1a", sizeof start);
+}
+
+static int open_saved(const char *path, const struct tool_color *color, patina_cloud **out)
+{
+    patina_cloud_info info = {.struct_size = sizeof info};
+    int code = patina_cloud_open(path, out);
+    if (!code)
+        code = patina_cloud_get_info(*out, &info);
+    if (!code && color->source == PATINA_COLOR_SCALAR && !info.has_scalars) {
+        tool_say("there is no attribute in '%s' to make a ramp of: convert it with --attribute %s", path, color->attribute);
+        code = PATINA_ERROR_ARGUMENT;
+    }
+    return code;
+}
+
 int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out,
                     struct tool_stations *stations, struct tool_scans *scans)
 {
     patina_file *file = NULL;
+    if (is_saved(path))
+        return open_saved(path, color, out);
     int code = patina_file_open(path, progress, &file);
     if (!code)
         code = patina_file_cloud(file, 0, progress, out);

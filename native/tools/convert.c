@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// patina convert IN OUT.ply: any readable file to a binary PLY with position, normal and colour.
+// patina convert IN OUT.ply: any readable file to a binary PLY with position, normal and colour; IN OUT.cloud: to a built cloud.
 #include "tool.h"
 
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const char out_of_memory[] = "out of memory";
 
@@ -43,10 +45,49 @@ static int read_columns(const patina_file *file, const patina_file_info *info, p
     return code;
 }
 
+static int ends_in(const char *path, const char *ending)
+{
+    const size_t length = strlen(path), size = strlen(ending);
+    return length > size && !strcmp(path + length - size, ending);
+}
+
+// Built and analysed: what `render` would make of the file each time.
+static int convert_to_cloud(const char *in, const char *out, const char *attribute)
+{
+    struct tool_color color = {.source = attribute ? PATINA_COLOR_SCALAR : PATINA_COLOR_OWN};
+    struct tool_stations stations = {0};
+    patina_analysis_desc desc = {.struct_size = sizeof desc, .keep_normals = 1};
+    patina_progress *progress = NULL;
+    patina_cloud *cloud = NULL;
+    snprintf(color.attribute, sizeof color.attribute, "%s", attribute ? attribute : "");
+    int code = patina_progress_create(&progress);
+    tool_cancellable(progress, NULL);
+    if (!code)
+        code = tool_load_cloud(in, &color, progress, &cloud, &stations);
+    tool_describe_stations(&stations, &desc);
+    desc.free_space = desc.station_count > 1; // one alone sees through nothing
+    if (!code)
+        code = patina_cloud_analyse(cloud, &desc, progress);
+    int result = code ? tool_failed(in, NULL, code) : TOOL_OK;
+    tool_cancellable(NULL, NULL);
+    if (!result && (code = patina_cloud_save(cloud, out)))
+        result = tool_failed(out, cloud, code);
+    tool_free_stations(&stations);
+    tool_drain_log(1);
+    patina_cloud_destroy(cloud);
+    patina_progress_destroy(progress);
+    return result;
+}
+
 int tool_convert(int count, char **arguments)
 {
-    if (count != 2)
+    const char *attribute = count == 4 && !strcmp(arguments[2], "--attribute") ? arguments[3] : NULL;
+    if (count != 2 && !attribute)
         return tool_misuse("convert: a file to read and a file to write, please");
+    if (ends_in(arguments[1], ".cloud"))
+        return convert_to_cloud(arguments[0], arguments[1], attribute);
+    if (attribute)
+        return tool_misuse("--attribute goes into a .cloud");
     patina_progress *progress = NULL;
     patina_file *file = NULL;
     void *columns[3] = {NULL, NULL, NULL};

@@ -10,7 +10,9 @@
 
 static const char usage_before[] =
     "patina info FILE                     what a file of points holds\n"
-    "patina convert IN.ply OUT.ply        writes a binary PLY\n"
+    "patina convert IN OUT.ply            writes a binary PLY\n"
+    "patina convert IN OUT.cloud          writes the built and analysed cloud: it opens at once, and parts read their share\n"
+    "  --attribute NAME                   with a scalar of the file, for --ramp\n"
     "patina analyse FILE -o OUT.ply       normal, spacing, radii, thickness, kind and certainty of every point, as columns\n"
     "  --neighbours K                     3 to 64 (16, and 48 where 16 leave doubts)\n"
     "patina render FILE... -o OUT.png     draws clouds as surfaces\n"
@@ -98,8 +100,17 @@ static const char usage_behind[] =
     "  --dump-plan                        the passes, and why\n"
     "  --dump-planes FOLDER               raw planes of the picture, its passes among them\n"
     "  --verbose                          the library's log too\n"
+    "  --tiles CxR --tile N               one of C x R tiles of the picture, from 1 on, from the top left: for `merge`\n"
+    "  --strip ROWS                       draws so many rows at a time: a large picture takes less memory\n"
+    "patina scatter FILE... --part K/N -o K.keys   what part K of the points shows of the picture that `render` with the same\n"
+    "                                     options draws; of .cloud files it reads no other points\n"
+    "  --behind NEXT                      of a round behind the first\n"
+    "patina merge FILE... -o OUT.png      the picture of all its tiles, or of all its parts' keys, with the same bytes\n"
+    "  --next NEXT                        of parts whose layers take further rounds: then this is written, and the exit\n"
+    "                                     status is 3; scatter all parts --behind NEXT, and merge the keys of all rounds\n"
+    "  --device NAME, --threads N         as of render\n"
     "patina version\n"
-    "Exit status: 0 done, 1 failed, 2 wrong use, 130 cancelled.\n";
+    "Exit status: 0 done, 1 failed, 2 wrong use, 3 another round is wanted, 130 cancelled.\n";
 
 static void print_usage(FILE *out)
 {
@@ -222,6 +233,10 @@ int main(int count, char **arguments)
         tool_say("warning: Ctrl-C will end the program without tidying up");
     if (!strcmp(command, "render"))
         return tool_render(count - 2, arguments + 2);
+    if (!strcmp(command, "scatter"))
+        return tool_scatter(count - 2, arguments + 2);
+    if (!strcmp(command, "merge"))
+        return tool_merge(count - 2, arguments + 2);
     if (!strcmp(command, "info"))
         return tool_info(count - 2, arguments + 2);
     if (!strcmp(command, "convert"))

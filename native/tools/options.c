@@ -351,7 +351,9 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = strcmp(value, "json");
         o->json = 1;
     } else {
-        bad = tool_parse_effect(name, value, &o->effects);
+        bad = tool_parse_farm(name, value, o);
+        if (bad > 0)
+            bad = tool_parse_effect(name, value, &o->effects);
         if (bad > 0)
             bad = tool_parse_color(name, value, &o->color);
         if (bad > 0) {

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// patina render FILE... -o OUT.png
+// patina render FILE... -o OUT.png; patina scatter; and what patina merge does of keys
 #include "view.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 // What one run holds; everything may be NULL.
 struct job {
     struct tool_options options;
+    const struct tool_parts *parts;
+    char *text;     // the arguments that say what the picture is
+    uint32_t round; // that a merge asks for; 0: the picture is done
     patina_device *device;
     patina_device_info device_info;
     patina_progress *progress;
@@ -40,6 +44,7 @@ static void destroy(struct job *job)
     patina_progress_destroy(job->progress);
     patina_device_destroy(job->device);
     free(job->pixels);
+    free(job->text);
 }
 
 static int open_device(struct job *job)
@@ -95,7 +100,7 @@ static int analyse(struct job *job, patina_cloud *cloud, const struct tool_stati
     desc.free_space = job->options.color.free_space != PATINA_FREE_SPACE_OFF;
     patina_cloud_info info = {.struct_size = sizeof info};
     const int error = patina_cloud_get_info(cloud, &info);
-    if (error || job->options.analysis == TOOL_UNANALYSED ||
+    if (error || info.has_shapes || job->options.analysis == TOOL_UNANALYSED || // a saved cloud knows
         (job->options.analysis == TOOL_ANALYSED_WHERE_NEEDED && !needs_analysis(&job->options, (int)info.has_normals)))
         return error;
     const double start = pt_milliseconds();
@@ -241,10 +246,15 @@ static int draw(struct job *job, double *ms)
         return bad ? tool_failed("panorama", job->frame, bad) : TOOL_OK;
     }
     int code = job->options.planes ? patina_frame_keep_planes(job->frame, 1) : PATINA_OK;
-    if (!code)
+    if (!code && job->parts->count)
+        code = patina_frame_merge(job->frame, job->scene, job->parts->keys, (uint32_t)job->parts->count, job->parts->next,
+                                  &job->round);
+    else if (!code)
         code = patina_frame_render(job->frame, job->scene);
     *ms = pt_milliseconds() - start;
     job->stats.struct_size = sizeof job->stats;
+    if (job->round)
+        return TOOL_OK;
     if (!code)
         code = patina_frame_get_stats(job->frame, &job->stats);
     if (!code && job->options.planes)
@@ -257,6 +267,66 @@ static int draw(struct job *job, double *ms)
             code = tool_color_pass(&job->options, job->frame, (size_t)job->stats.width * job->stats.height, job->pixels);
     }
     return code ? tool_failed("render", job->frame, code) : TOOL_OK;
+}
+
+// Some rows at a time, from the top, which are written before the next are drawn.
+static int draw_strips(struct job *job, double *ms)
+{
+    const struct tool_options *options = &job->options;
+    uint32_t region[4] = {0, 0, options->settings.width, options->settings.height};
+    if (options->settings.region[2])
+        memcpy(region, options->settings.region, sizeof region);
+    const uint32_t width = region[2] - region[0], height = region[3] - region[1];
+    char text[160];
+    tool_tile_text(options, text, sizeof text);
+    struct tool_png *png = tool_png_open(options->output, width, height, options->transparent,
+                                         options->tile ? tool_tile_name : NULL, text);
+    int result = png ? TOOL_OK : TOOL_FAILED;
+    for (uint32_t end = region[3]; end > region[1] && !result;) {
+        const uint32_t rows = end - region[1] < options->strip ? end - region[1] : options->strip;
+        patina_settings settings = options->settings;
+        double part = 0;
+        memcpy(settings.region, (uint32_t[]){region[0], end - rows, region[2], end}, sizeof settings.region);
+        const int code = patina_scene_set_settings(job->scene, &settings);
+        result = code ? tool_failed("render", job->scene, code) : draw(job, &part);
+        if (!result && tool_png_rows(png, job->pixels, rows))
+            result = TOOL_FAILED;
+        free(job->pixels);
+        job->pixels = NULL;
+        *ms += part;
+        end -= rows;
+    }
+    if (png && tool_png_close(png, !result) && !result)
+        result = TOOL_FAILED;
+    job->stats.width = width;
+    job->stats.height = height;
+    return result;
+}
+
+static int scatter(struct job *job)
+{
+    const struct tool_options *options = &job->options;
+    const patina_part part = {.struct_size = sizeof part,
+                              .part = options->part[0],
+                              .of = options->part[1],
+                              .behind = options->behind,
+                              .note = job->text};
+    const double start = pt_milliseconds();
+    const int code = patina_frame_scatter(job->frame, job->scene, &part, options->output);
+    if (code)
+        return tool_failed("scatter", job->frame, code);
+    tool_say("%s: part %u of %u, %s, %.1f ms", options->output, part.part, part.of, job->device_info.name,
+             pt_milliseconds() - start);
+    return TOOL_OK;
+}
+
+static int write_picture(const struct job *job)
+{
+    const struct tool_options *options = &job->options;
+    char text[160];
+    tool_tile_text(options, text, sizeof text);
+    return tool_write_png(options->output, job->pixels, job->stats.width, job->stats.height, options->transparent,
+                          options->tile ? tool_tile_name : NULL, text);
 }
 
 static int measure(struct job *job)
@@ -295,10 +365,17 @@ static int run(struct job *job)
         result = shadows(job);
     if (result || (!options->output && !options->planes && !options->repeat))
         return result;
+    if (job->parts->scatter)
+        return scatter(job);
 
-    result = draw(job, &ms);
+    result = options->strip ? draw_strips(job, &ms) : draw(job, &ms);
+    if (!result && job->round) {
+        tool_say("%s: round %u is wanted: scatter all parts --behind %s, and merge the keys of all rounds", options->output,
+                 job->round, job->parts->next);
+        return TOOL_AGAIN;
+    }
     if (!result && options->output) {
-        if (tool_write_png(options->output, job->pixels, job->stats.width, job->stats.height, options->transparent))
+        if (!options->strip && write_picture(job))
             return TOOL_FAILED;
         tool_say("%s: %llu points, %ux%u, %s, %.1f ms", options->output, (unsigned long long)job->stats.points,
                  job->stats.width, job->stats.height, job->device_info.name, ms);
@@ -308,13 +385,19 @@ static int run(struct job *job)
     return result;
 }
 
-int tool_render(int count, char **arguments)
+int tool_draw(int count, char **arguments, const struct tool_parts *parts)
 {
-    struct job job = {0};
-    int result = tool_parse_render(count, arguments, &job.options);
+    struct job job = {.parts = parts, .text = tool_options_text(count, arguments)};
+    int result = job.text ? tool_parse_render(count, arguments, &job.options)
+                          : tool_failed("render", NULL, PATINA_ERROR_MEMORY);
+    if (!result)
+        result = tool_check_farm(&job.options, parts->scatter);
+    job.options.digest = result ? 0 : tool_digest(job.text);
     if (!result)
         result = run(&job);
     tool_drain_log(job.options.verbose ? 2 : 1);
     destroy(&job);
     return result;
 }
+
+int tool_render(int count, char **arguments) { return tool_draw(count, arguments, &(struct tool_parts){0}); }

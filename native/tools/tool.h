@@ -9,10 +9,12 @@
 
 #include <stdio.h>
 
-enum tool_exit { TOOL_OK = 0, TOOL_FAILED = 1, TOOL_USAGE = 2, TOOL_CANCELLED = 130 };
+enum tool_exit { TOOL_OK = 0, TOOL_FAILED = 1, TOOL_USAGE = 2, TOOL_AGAIN = 3, TOOL_CANCELLED = 130 };
 
 // Each takes the arguments after its own name and returns a tool_exit.
 int tool_render(int count, char **arguments);
+int tool_scatter(int count, char **arguments);
+int tool_merge(int count, char **arguments);
 int tool_info(int count, char **arguments);
 int tool_convert(int count, char **arguments);
 int tool_analyse(int count, char **arguments);
@@ -40,7 +42,7 @@ int tool_cancelled(void);
 enum tool_view { VIEW_ANGLES, VIEW_LOOK };
 enum tool_analysis { TOOL_ANALYSED_WHERE_NEEDED, TOOL_ANALYSED, TOOL_UNANALYSED };
 
-enum { TOOL_OPACITIES = 64, TOOL_MESHES = 64, TOOL_CLIPS = 64 };
+enum { TOOL_OPACITIES = 64, TOOL_MESHES = 64, TOOL_CLIPS = 64, TOOL_TILES = 65536 };
 
 // Colours of points and clips.
 struct tool_color {
@@ -91,8 +93,13 @@ struct tool_options {
     uint32_t analysis; // tool_analysis
     int cull, transparent, shadows, headlight, sun, json, dump_plan, verbose;
     float ambient[3];
-    double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
-    int repeat;       // measured frames; 0 = just the picture
+    double sun_at[3];        // degrees around z (as the camera's azimuth), above the horizon, diameter
+    int repeat;              // measured frames; 0 = just the picture
+    uint32_t tiles[2], tile; // columns and rows, and which, from 1 on, from the top left; 0: the whole picture
+    uint32_t strip;          // rows that are drawn at a time; 0: all
+    uint32_t part[2];        // of so many; 0: the whole cloud
+    const char *behind;      // what the last round's merge left; NULL: the first
+    uint64_t digest;         // of the arguments that say what the picture is
     patina_settings settings;
     patina_effects effects;
     struct tool_color color;
@@ -114,6 +121,11 @@ int tool_parse_pass(const char *value, struct tool_options *options);
 
 // Fills options from the arguments of `render`; files point into the vector, which is reordered. Returns a tool_exit.
 int tool_parse_render(int count, char **arguments, struct tool_options *options);
+
+// Options of tiles, strips and parts. 0 taken, -1 a bad value, 1 none of them.
+int tool_parse_farm(const char *name, const char *value, struct tool_options *options);
+// Whether they go with the others, once all are there; scatters: `patina scatter` asks. A tool_exit.
+int tool_check_farm(struct tool_options *options, int scatters);
 
 // An option of tool_color: 0 taken, -1 a bad value, 1 none of them.
 int tool_parse_color(const char *name, const char *value, struct tool_color *color);
@@ -151,12 +163,41 @@ int tool_add_clips(const struct tool_color *color, patina_scene *scene);
 
 // ---- output ------------------------------------------------------------------------------------------------------
 
-// Writes premultiplied linear RGBA, row 0 at the bottom, as an 8-bit sRGB PNG; alpha: keep it. 0, or -1 after a message.
-int tool_write_png(const char *path, const float *pixels, uint32_t width, uint32_t height, int alpha);
+// Writes premultiplied linear RGBA, row 0 at the bottom, as an 8-bit sRGB PNG, whole or not at all; alpha: keep it. name: of a text
+// in it; NULL: none. 0, or -1 after a message.
+int tool_write_png(const char *path, const float *pixels, uint32_t width, uint32_t height, int alpha, const char *name,
+                   const char *text);
+// The same by parts, the picture's top first. NULL or -1 after a message; closing frees it in any case.
+struct tool_png;
+struct tool_png *tool_png_open(const char *path, uint32_t width, uint32_t height, int alpha, const char *name,
+                               const char *text);
+int tool_png_rows(struct tool_png *png, const float *pixels, uint32_t rows); // row 0 at the bottom
+int tool_png_bytes(struct tool_png *png, const uint8_t *row);                // as they stand in the file
+int tool_png_close(struct tool_png *png, int good);                          // not good: no file is written
 
 // The pass that the options ask for, in place of colours in `count` pixels of premultiplied RGBA: where something is. Says the range
 // of the ramp. A patina_error.
 int tool_color_pass(const struct tool_options *options, const patina_frame *frame, size_t count, float *pixels);
+
+// ---- tiles and parts -------------------------------------------------------------------------------------------------
+
+// What `render` does in place of rendering.
+struct tool_parts {
+    int scatter;             // a part's keys
+    const char *const *keys; // of all parts, to be merged
+    int count;
+    const char *next; // NULL, or where a further round is told what lies behind
+};
+int tool_draw(int count, char **arguments, const struct tool_parts *parts);
+int tool_merge_tiles(int count, char **paths, const char *output);
+
+extern const char tool_tile_name[]; // of the text in a tile's PNG
+void tool_tile_text(const struct tool_options *options, char *text, size_t size);
+// tile: from 1 on, from the top left, row by row. region: as patina_settings has it.
+void tool_tile_region(const uint32_t tiles[2], uint32_t tile, uint32_t width, uint32_t height, uint32_t region[4]);
+// The arguments that say what a picture is, as one text; the caller frees it. NULL without memory.
+char *tool_options_text(int count, char **arguments);
+uint64_t tool_digest(const char *text);
 
 // Times of several frames, whole and by pass.
 struct tool_times;
