@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+
+from .importers.scans import Scan
 
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
@@ -22,9 +25,36 @@ class Points:
     colors: np.ndarray | None  # (n, 3) uint8 sRGB
     scalars: dict[str, np.ndarray]  # (n,) float32
     crs: str = ""
+    scans: Sequence[Scan] = ()  # the scalar "scan" says which of them each point is of; directions and poses in the positions' coordinates
+    stations: np.ndarray | None = None  # (scans, 3) float64, in these too; NaN: not known
+
+
+def _scan_lines(points: Points) -> list[str]:
+    """For the header, as the library's reader has them: ply_scans.c."""
+    lines = []
+    for index, scan in enumerate(points.scans):
+        station = points.stations[index] if points.stations is not None and index < len(points.stations) else (math.nan,) * 3
+        there = all(map(math.isfinite, station))
+        numbers = (*(station if there else (0.0,) * 3), *scan.pose)
+        name = " ".join(scan.name.split()).encode("utf-8", "replace").decode("utf-8")
+        lines.append(" ".join(["obj_info patina_scan", *map(str, scan.grid), *(repr(float(value)) for value in (scan.interval, *scan.direction)),
+                               "at" if there else "nowhere", *(repr(float(value)) for value in numbers), name]).rstrip())
+    return lines
+
+
+def _by_scan(points: Points) -> Points:
+    """Points of each scan behind each other, in their order."""
+    of = points.scalars.get("scan")
+    if not points.scans or of is None or (np.diff(of) >= 0).all():
+        return points
+    order = np.argsort(of, kind="stable")
+    return replace(points, positions=points.positions[order], normals=None if points.normals is None else points.normals[order],
+                   colors=None if points.colors is None else points.colors[order],
+                   scalars={name: values[order] for name, values in points.scalars.items()})
 
 
 def write_ply(path: Path, points: Points) -> None:
+    points = _by_scan(points)
     columns = [(axis, "f8", points.positions[:, i]) for i, axis in enumerate("xyz")]
     if points.normals is not None:
         columns += [(f"n{axis}", "f4", points.normals[:, i]) for i, axis in enumerate("xyz")]
@@ -34,7 +64,7 @@ def write_ply(path: Path, points: Points) -> None:
     rows = np.zeros(len(points.positions), np.dtype([(name, f"<{kind}") for name, kind, _ in columns]))
     for name, _, values in columns:
         rows[name] = values
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
+    header = ["ply", "format binary_little_endian 1.0", *_scan_lines(points), f"element vertex {len(rows)}"]
     header += [f"property {_PLY_TYPES[kind]} {name}" for name, kind, _ in columns]
     with open(path, "wb") as file:
         file.write("\n".join([*header, "end_header", ""]).encode())

@@ -39,6 +39,11 @@ class Pose:
     turn: np.ndarray | None = None  # (3, 3); None: none
     place: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))
 
+    def matrix(self) -> tuple[float, ...]:
+        """Three rows of four."""
+        turn = np.eye(3) if self.turn is None else self.turn
+        return tuple(np.column_stack([turn, self.place]).ravel().tolist())
+
 
 def _open(path: Path) -> Any:
     try:
@@ -75,6 +80,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     file = _open(path)
     parts: list[dict[str, np.ndarray]] = []
     stations: list[np.ndarray] = []
+    poses: list[Pose] = []
     warnings: list[str] = []
     failed: native.PatinaError | None = None
     done, read, index, crs = 0, 0, 0, ""
@@ -86,6 +92,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             what = f"{path.name}: scan {index}"
             pose, wrong = _pose(header)
             stations.append(_station(header, pose))
+            poses.append(pose or Pose())
             if wrong:
                 warnings.append(f"{what}{wrong}")
             if pose is None:
@@ -117,7 +124,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     points = merge(path.stem, parts, {"crs": crs, **crs_notes(units(crs))} if crs else {})
     points.warnings += warnings
     points.notes |= scanners_of(stations if np.isfinite(stations).any() else [], points.origin)
-    points.notes |= scans.note(_described(headers, points, stations, path.name))
+    points.notes |= scans.note(_described(headers, points, stations, poses, path.name))
     if wanted.every == 1:  # a thinned grid is none
         yield from grid_normals(points, stations, progress)
     return points
@@ -152,7 +159,7 @@ def _station(header: Any, pose: Pose | None) -> np.ndarray:
     return pose.place.copy() if known else np.full(3, np.nan)
 
 
-def _described(headers: list[Any], points: PointFile, stations: list[np.ndarray], name: str) -> list[scans.Scan]:
+def _described(headers: list[Any], points: PointFile, stations: list[np.ndarray], poses: list[Pose], name: str) -> list[scans.Scan]:
     """What is known of each scan; says at the points what is wrong with their grids."""
     found = []
     of = points.scalars.get("scan", np.empty(0, np.float32))
@@ -161,7 +168,7 @@ def _described(headers: list[Any], points: PointFile, stations: list[np.ndarray]
         own = slice(own[0], own[-1] + 1) if len(own) else slice(0)
         places = points.positions[own].astype(np.float64)
         direction = scans.direction(places, stations[index] - points.origin)
-        interval = 0.0
+        interval, grid = 0.0, (0, 0)
         if {"rowIndex", "columnIndex"} <= set(header.point_fields) and len(places):
             row, column = (points.scalars[axis][own] for axis in ("row", "column"))
             good = (row >= 0) & (column >= 0) & (row < CELLS) & (column < CELLS)
@@ -170,7 +177,8 @@ def _described(headers: list[Any], points: PointFile, stations: list[np.ndarray]
             if taken := scans.twice(row[good], column[good]):
                 points.warnings.append(f"{name}: scan {index}: {taken:,} points lie in cells of its grid that others have")
             interval = scans.interval(places[good], row[good], column[good])
-        found.append(scans.Scan(_name(header), len(places), direction, interval))
+            grid = (int(column[good].max(initial=-1)) + 1, int(row[good].max(initial=-1)) + 1)
+        found.append(scans.Scan(_name(header), len(places), direction, interval, poses[index].matrix(), grid))
     return found
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from .. import jobs, native
 from . import scans
 from .reading import Filter, PointFile, Progress, scanners_of
@@ -21,7 +23,11 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
         task = native.File.start(str(path), inner)
     yield task
     with task.result() as file:
-        told = [scans.Scan(scan.name, scan.count, scan.direction, scan.interval) for scan in file.scans()]
+        found = file.scans()
+        told = [scans.Scan(scan.name, scan.count, scan.direction, scan.interval, scan.pose, scan.grid) for scan in found]
+        stations = file.stations()
+        if not len(stations) and any(scan.station for scan in found):
+            stations = [scan.station or (np.nan,) * 3 for scan in found]
         # the log is the whole process's; nobody else reads it
         names = {path.name, *(scan.name for scan in told if scan.name)}
         warnings = [text for level, text in native.log_lines() if level == 1 and any(name in text for name in names)]
@@ -33,7 +39,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             scalars={name: file.attribute(index) for index, name in enumerate(file.attributes)},
             origin=file.origin,
             invalid=file.invalid_positions,
-            notes=scanners_of(file.stations(), file.origin) | scans.note(told),
+            notes=scanners_of(stations, file.origin) | scans.note(told),
             warnings=warnings,
             splats=file.splats).filtered(wanted)
 

@@ -15,6 +15,7 @@ PROPERTY = "patina_scans"
 ALL_AROUND = 0.75  # the mean of the unit vectors of a cone of 60 degrees, as the library has it
 Direction = tuple[float, float, float]
 UNKNOWN: Direction = (0.0, 0.0, 0.0)
+HERE = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)  # the pose of a scan in the file's own coordinates
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Scan:
     count: int
     direction: Direction = UNKNOWN  # in which the scanner looked, unit; UNKNOWN, or all around
     interval: float = 0.0  # between neighbouring samples, in the file's unit; 0: not known
+    pose: tuple[float, ...] = HERE  # the file's coordinates from the scan's own: three rows of four
+    grid: tuple[int, int] = (0, 0)  # columns and rows; 0: there is none
 
 
 def packed(scans: Sequence[Scan]) -> str:
@@ -34,10 +37,11 @@ def packed(scans: Sequence[Scan]) -> str:
 def unpacked(text: object) -> list[Scan]:
     """None where it is not what was packed."""
     try:
-        return [Scan(str(item["name"]), int(item["count"]), tuple(map(float, item["direction"])), float(item["interval"]))
-                for item in json.loads(text)]
-    except (TypeError, ValueError, KeyError):
+        found = [Scan(str(item["name"]), int(item["count"]), tuple(map(float, item["direction"])), float(item["interval"]),
+                      tuple(map(float, item.get("pose", HERE))), tuple(map(int, item.get("grid", (0, 0))))) for item in json.loads(text)]
+    except (TypeError, ValueError, KeyError, AttributeError):
         return []
+    return found if all(len(scan.direction) == 3 and len(scan.pose) == 12 and len(scan.grid) == 2 for scan in found) else []
 
 
 def note(scans: Sequence[Scan]) -> dict[str, str]:

@@ -357,6 +357,8 @@ class FileScan:
     direction: tuple[float, float, float]  # in which the scanner looked; 0: not known, or all around
     interval: float  # of neighbouring samples; 0: not known
     station: tuple[float, float, float] | None  # file coordinates
+    pose: tuple[float, ...]  # these, from the scan's own: three rows of four
+    grid: tuple[int, int]  # columns and rows; 0: there is none
 
 
 class File(_Handle):
@@ -429,7 +431,7 @@ class File(_Handle):
         scan = abi.FileScan()
         self._call("get_scan", index, byref(scan))
         return FileScan(scan.name.decode("utf-8", "replace"), scan.count, tuple(scan.direction), scan.interval,
-                        tuple(scan.station) if scan.has_station else None)
+                        tuple(scan.station) if scan.has_station else None, tuple(scan.pose), (scan.columns, scan.rows))
 
 
 class Scene(_Handle):

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,8 +15,8 @@ from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
 
 from .. import exporters, importers, jobs, native
-from ..importers import origin
-from ..sync import attributes, edits, linked
+from ..importers import origin, scans
+from ..sync import analysis, attributes, edits, linked
 from . import set_up
 
 
@@ -108,8 +111,24 @@ def read_local(obj: bpy.types.Object) -> exporters.Points | None:
     if local is None:
         return None
     own = np.array(obj.original.get(origin.PROPERTY, origin.ZERO), np.float64)
+    told = obj.original.data
     return exporters.Points(local.astype(np.float64) + own, attributes.normals(data, count, obj.patina.normal_attribute),
-                            _bytes(attributes.colors(data, count, obj.patina.color_attribute)), _scalars(data, count))
+                            _bytes(attributes.colors(data, count, obj.patina.color_attribute)), _scalars(data, count),
+                            **_scans(told.get(scans.PROPERTY), told.get(analysis.SCANNERS), np.eye(3), own, own))
+
+
+def _scans(told: object, stations: Sequence[float] | None, turn: np.ndarray, move: np.ndarray, own: np.ndarray) -> dict[str, Any]:
+    """Fields of exporters.Points, of what an object tells of its scans, moved as its points are: turn (3, 3), and to where its zero comes;
+    own: where that lies in the file that it was read from."""
+    found = []
+    for scan in scans.unpacked(told):
+        pose = np.array(scan.pose).reshape(3, 4)
+        placed = np.column_stack([turn @ pose[:, :3], turn @ (pose[:, 3] - own) + move])
+        direction = turn @ np.array(scan.direction)
+        length = np.linalg.norm(direction)
+        found.append(replace(scan, direction=tuple((direction / length).tolist()) if length else scans.UNKNOWN, pose=tuple(placed.ravel().tolist())))
+    places = None if stations is None else np.array(stations, np.float64).reshape(-1, 3) @ turn.T + move
+    return {"scans": found, "stations": places}
 
 
 def _bytes(colors: np.ndarray | None) -> np.ndarray | None:
@@ -152,7 +171,9 @@ def _of_linked(obj: bpy.types.Object, scene: bpy.types.Scene) -> exporters.Point
     normals = points.normals if points.normals is None else _turned(points.normals, turn)
     return exporters.Points((points.positions + (np.array(points.origin) - own)) @ turn.T + move, normals, _bytes(points.colors),
                             {name: values.astype(np.float32) for name, values in points.scalars.items()},
-                            str(points.notes.get("crs", "")))
+                            str(points.notes.get("crs", "")),
+                            **_scans(points.notes.get(scans.NOTE), points.notes.get("scanners"), turn,
+                                     turn @ (np.array(points.origin) - own) + move, np.array(points.origin)))
 
 
 def _turned(normals: np.ndarray, turn: np.ndarray) -> np.ndarray:
@@ -187,7 +208,9 @@ def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> 
     if normals is not None:
         normals = _turned(normals, turn)
     return exporters.Points(positions, normals, _bytes(colors), _scalars(data, count),
-                            str(obj.original.data.get("patina_crs", "")))
+                            str(obj.original.data.get("patina_crs", "")), **_scans(
+                                obj.original.data.get(scans.PROPERTY), obj.original.data.get(analysis.SCANNERS), turn, move,
+                                np.array(obj.original.get(origin.PROPERTY, origin.ZERO), np.float64)))
 
 
 def _scalars(data: bpy.types.ID, count: int) -> dict[str, np.ndarray]:
@@ -202,8 +225,8 @@ def _scalars(data: bpy.types.ID, count: int) -> dict[str, np.ndarray]:
 
 def _join(parts: list[exporters.Points]) -> exporters.Points | None:
     """One set of columns; what a part lacks is 0."""
-    if not parts:
-        return None
+    if len(parts) < 2:
+        return parts[0] if parts else None
 
     def column(values: list[np.ndarray | None], width: tuple[int, ...]) -> np.ndarray | None:
         if all(value is None for value in values):

@@ -13,9 +13,8 @@ from bpy.types import Context, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native, styles
-from ..importers import PointFile, name_of, origin, scans, told
+from ..importers import PointFile, name_of, origin, told
 from ..sync import files, linked, sequence
-from ..sync.analysis import SCANNERS
 from . import set_up, stations
 from .steps import Stepped
 
@@ -199,11 +198,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         _select_none()
         for path, item in found.items():
             name = told(name_of(path).replace("#", "").rstrip("_-. ") or path.stem if self.sequence else name_of(path))
-            obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
-            if item.scanners:
-                obj.data[SCANNERS] = item.scanners
-            if item.told:
-                obj.data[scans.PROPERTY] = item.told
+            obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box, item))
             files.assign(obj, files.as_preferred(path))
             obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, item.units)

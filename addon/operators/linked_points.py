@@ -77,7 +77,7 @@ class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
         except (native.PatinaError, OSError) as error:
             self.report({'ERROR'}, importers.told(f"Patina: {path.name}: {error}"))
             return {'CANCELLED'}
-        obj.data = linked.box_mesh(obj.name, found.box)
+        obj.data = linked.box_mesh(obj.name, found.box, found)
         # the file's own origin may differ from the object's by what float32 holds
         obj[origin.PROPERTY] = [float(value) for value in found.origin]
         files.assign(obj, files.as_preferred(path))

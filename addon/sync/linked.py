@@ -229,10 +229,14 @@ def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None, u
     return Linked(cloud, origin, cloud.box, scanners or [], tuple(units or (1.0, 1.0)), known, told)
 
 
-def box_mesh(name: str, box: tuple[Corner, Corner]) -> bpy.types.Mesh:
-    """Eight corners and twelve edges."""
+def box_mesh(name: str, box: tuple[Corner, Corner], known: Linked | None = None) -> bpy.types.Mesh:
+    """Eight corners and twelve edges, and what is known of the scanners and their scans."""
     corners = [tuple(box[i >> k & 1][k] for k in range(3)) for i in range(8)]
     edges = [(i, i | 1 << k) for i in range(8) for k in range(3) if not i >> k & 1]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(corners, edges, [])
+    if known and known.scanners:
+        mesh[analysis.SCANNERS] = known.scanners
+    if known and known.told:
+        mesh[scans_of_files.PROPERTY] = known.told
     return mesh

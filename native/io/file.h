@@ -24,6 +24,7 @@ struct pt_scan {
     bool parallel, nowhere; // nowhere: neither place nor direction are known
     double pose[12];        // the file's coordinates from the scan's own: three rows of four
     double direction[3];    // in which the scanner looked, unit; 0: not known, or all around. Of pt_file_measure_scans, as is
+    bool told;              // direction and interval, by the file itself: they are not measured
     double interval;        // the median way from a point to those beside it in the grid; 0: there are none
 };
 

@@ -63,6 +63,9 @@ struct ply_target {
     bool wrap;     // negative values are bytes that a writer called signed: -1 is 255
 };
 
+// What a header of `header` bytes tells of the file's scans, once its points are read; what is wrong there is told in the log. PATINA_OK or
+// PATINA_ERROR_MEMORY, without words.
+int ply_read_scans(struct patina_file *file, const struct pt_input *input, uint64_t header);
 int ply_read_header(const struct pt_input *input, struct ply_header *header);
 
 // The lists of one property, handed on row by row.

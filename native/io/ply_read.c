@@ -430,6 +430,8 @@ int pt_ply_read(struct patina_file *file, const struct pt_input *input)
     }
     plan.properties = header->properties + plan.points->first;
     code = read_points(&plan);
+    if (!code && ply_read_scans(file, input, header->body))
+        code = out_of_memory(&plan);
 done:
     free(plan.staged);
     free(plan.targets);

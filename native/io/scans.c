@@ -103,6 +103,8 @@ int pt_file_measure_scans(struct patina_file *file)
     int code = PATINA_OK;
     for (uint32_t s = 0; s < file->scan_count && !code; s++) {
         struct pt_scan *scan = &file->scans[s];
+        if (scan->told)
+            continue;
         measure_direction(file, scan);
         if (scan->count > 1 && scan->columns && scan->rows && counts(columns) && counts(rows))
             code = measure(file, scan, columns, rows);

@@ -257,3 +257,82 @@ def test_range_images():
     bpy.data.objects.remove(behind)
     group.pixel, group.sharpness = 0.3, 0.1  # below what the library takes
     check(drawn(render()), "clamped")
+
+
+def told_of(obj):
+    from patina.importers import scans
+    return scans.unpacked(obj.data.get("patina_scans")), np.array(obj.data.get("patina_scanners", [])).reshape(-1, 3)
+
+
+def check_told(got, wanted, what):
+    """Names, poses, directions, intervals, grids and counts, and where the scanners stood."""
+    (scans, stations), (before, stood) = got, wanted
+    check([(scan.name, scan.count, scan.grid) for scan in scans] == [(scan.name, scan.count, scan.grid) for scan in before], f"{what}: {scans}")
+    for scan, was in zip(scans, before, strict=True):
+        check_close(scan.pose, was.pose, 1e-9, f"{what}: poses")
+        check_close(scan.direction, was.direction, 1e-9, f"{what}: directions")
+        check_close(scan.interval, was.interval, 1e-9, f"{what}: intervals")
+    check(stations.shape == stood.shape, f"{what}: {stations} {stood}")
+    if len(stood):
+        check_close(stations, stood, 1e-4, f"{what}: stations")
+
+
+def test_scans_survive_linking():
+    """Converted to a linked cloud, saved, opened again without what was kept, and converted back, scans keep numbers, names, poses,
+    directions, intervals and grids; they are listed and culled as before, and stations come with an import of the written file."""
+    from patina.sync import clouds, linked
+    obj = pair(False, "survive")
+    group = obj.patina.ranges
+    group.use, group.use_cull = True, True
+    known, whole = told_of(obj), sides()
+    check(len(known[0]) == 2 and any(known[0][0].direction) and known[0][0].interval > 0.09 and known[0][1].pose[3] == 0.2, f"{known}")
+    path = SCRATCH / "survive.ply"
+    bpy.ops.object.patina_mesh_to_linked(filepath=str(path))
+    check(obj.patina.linked_file.endswith("survive.ply") and len(obj.data.vertices) == 8, "linked")
+    check_told(told_of(obj), known, "linked")
+    check(sides() == whole, f"{sides()} of {whole}")
+    bpy.ops.object.patina_scans_list()
+    check([scan.name for scan in obj.patina.points.scans] == ["left.ply", "right.ply"], "listed")
+    blend = SCRATCH / "survive.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    for kept in linked.source(path).kept.parent.glob(linked.source(path).kept.name.split("-")[0] + "*"):
+        kept.unlink()
+    clouds.CACHE.clear()
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    obj = bpy.data.objects["survive"]
+    bpy.context.view_layer.objects.active = obj
+    check(sides() == whole, "opened again")
+    obj.patina.points.scans[0].hide = True
+    check(sides() == (0, whole[1]), "one is hidden")
+    obj.patina.points.scans[0].hide = False
+    camera = bpy.context.scene.camera
+    camera.location.z, camera.rotation_euler.y = -8.0, np.pi
+    check(not drawn(render()), "from behind both are culled")
+    bpy.ops.object.patina_linked_to_mesh()
+    check_told(told_of(obj), known, "converted back")
+    check(not drawn(render()), "culled as before")
+
+
+def test_stations_survive_linking():
+    """Of a PTX, moved and scaled: its scanners, as empties, of the linked file that was written of it."""
+    new_scene()
+    path = text_file("survive.ptx", PTX.format(10) + WALL + PTX.format(20) + WALL)
+    obj, = import_ply(path)
+    known = told_of(obj)
+    check(len(known[1]) == 2 and np.allclose(known[0][1].pose, (1, 0, 0, 20, 0, 1, 0, 0, 0, 0, 1, 0)), f"{known}")
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.patina_mesh_to_linked(filepath=str(SCRATCH / "survive_ptx.ply"))
+    check_told(told_of(obj), known, "linked")
+    check(len(obj.children) == 2 and not bpy.ops.object.patina_add_stations.poll(), "its empties stay")
+    obj.location.x = 100.0
+    bpy.context.view_layer.update()
+    bpy.ops.export_scene.patina_points(filepath=str(SCRATCH / "moved.ply"))
+    for link in (False, True):
+        before = set(bpy.data.objects)
+        bpy.ops.import_scene.patina_points(filepath=str(SCRATCH / "moved.ply"), link=link)
+        new = set(bpy.data.objects) - before
+        empties = sorted((item for item in new if item.type == 'EMPTY'), key=lambda item: item["patina_station"])
+        bpy.context.view_layer.update()
+        check_close([item.matrix_world.translation for item in empties], [(110, 0, 0), (120, 0, 0)], 1e-3, "places")
+        own, = (item for item in new if item.type == 'MESH')
+        check_close(told_of(own)[0][1].pose, (1, 0, 0, 120, 0, 1, 0, 0, 0, 0, 1, 0), 1e-3, "poses move too")

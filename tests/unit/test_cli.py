@@ -308,6 +308,38 @@ def test_info_tells_scans():
     run("render", "both.conf", "-o", "both.png", "--size", "32x32")
 
 
+def test_info_of_saved_scans():
+    """What the add-on's PLYs tell of scans; where a line lies, or points of a scan are scattered, all of it is left out, and a message says
+    which scan it is; the points are there."""
+    head = "ply\nformat ascii 1.0\n"
+    body = "".join(f"property float {name}\n" for name in ("x", "y", "z", "scan")) + "end_header\n"
+    pose = "0 -1 0 5 1 0 0 6 0 0 1 7"
+    lines = [f"obj_info patina_scan 5 4 0.25 0 0 -1 at 5 6 7 {pose} the first one\n", f"obj_info patina_scan 0 0 0 0 0 0 nowhere 0 0 0 {pose}\n"]
+
+    def told(lines, of):
+        (FOLDER / "saved.ply").write_text(head + "".join(lines) + f"element vertex {len(of)}\n" + body + "".join(f"{i} {i * i} 0 {s}\n" for i, s in enumerate(of)))
+        done = run("info", "saved.ply")
+        assert f"points      {len(of)}" in done.stdout
+        return done
+
+    good = told(lines, [0, 0, 0, 1, 1]).stdout
+    assert "scan 0      the first one, 3 points, grid 5 x 4, interval 0.25, from 5 6 7, looking 0.000 0.000 -1.000" in good, good
+    assert re.search(r"scan 1 +(unnamed, )?2 points", good), good
+    one = told(lines[:1], [0, 0])
+    assert "scan 0      the first one, 2 points" in one.stdout
+    wrong = {"2 0 0 0 0 2 0 0 0 0 9 0": "scan 0", "0 -1 0 5 1 0 0 6 0 0 1": "scan 0", "0 -1 0 5 1 0 0 6 0 0 nan 7": "scan 0"}
+    for matrix, words in wrong.items():
+        done = told([lines[0].replace(pose, matrix), lines[1]], [0, 0, 1])
+        assert f"{words} is none" in done.stderr and "scan 0 " not in done.stdout, (done.stderr, done.stdout)
+    for line in ("obj_info patina_scan 5 4 -1 0 0 -1 at 5 6 7", "obj_info patina_scan 5 4.5 1 0 0 -1 at 5 6 7", "obj_info patina_scan 5 4 1 0 0 -9 at 5 6 7",
+                 "obj_info patina_scan 5 4 1 0 0 -1 here 5 6 7"):
+        assert "scan 1 is none" in told([lines[0], f"{line} {pose} bad\n"], [0, 1]).stderr, line
+    done = told(lines, [0, 1, 0, 1])
+    assert "do not lie one behind the other" in done.stderr and "scan 0 " not in done.stdout, done.stderr
+    assert "grid 5 x 4" in told(lines, [0, 9, 1]).stdout, "points of no scan are of none"
+    assert "patina_scan" not in told(["obj_info patina_scan\n"], [0]).stderr
+
+
 def facing_walls(name):
     """Two range images of a wall of 2 x 2: one looks to -z at the wall's place, the other, below it, to z."""
     grid = "".join(f"{u / 20 - 1} {v / 20 - 1} 0\n" for v in range(41) for u in range(41)) + "".join(f"1 {i}\n" for i in range(1681))

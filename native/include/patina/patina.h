@@ -332,7 +332,8 @@ typedef struct patina_file_scan {
 
 // Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS, PTX or conf file whole; formats are told apart by content. Errors name
 // the byte offset (binary) or line (text). Points of a scanner's grid (PTX, range_grid of a PLY) have the attributes "row" and
-// "column", those of a PTX and a conf "scan" too. A PLY's faces, and a scanner's grid, give normals where there are no others.
+// "column", those of a PTX and a conf "scan" too; PLYs that the add-on writes say what is known of their scans. A PLY's faces, and a
+// scanner's grid, give normals where there are no others.
 // A conf (Stanford's: lines "bmesh NAME tx ty tz qx qy qz qw") is the files that it names, each in its place, p' = R(conjugate of q) p
 // + t. Scans that cannot be read or placed are left out, and a line of the log names them: of a conf and of a PTX.
 PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
