@@ -18,7 +18,7 @@ Some groups are of --full, --readme and --only alone: meshes (as triangles again
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
 scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
 (ten minutes of work in Blender), analysis (what every point knows, 10 million), walk (frame by frame
-through virtual scans). With --quick they take a million points, and one
+through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs). With --quick they take a million points, and one
 minute. Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor)
 and scaling (threads up to all cores).
 """
@@ -45,6 +45,7 @@ import papers
 import peers
 import plots
 import quoted
+import ranges
 import readme
 import report
 import scans
@@ -59,7 +60,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "scans", "independent", "session", "analysis", "walk", "graphics", "scaling")
+          "leaves", "scans", "independent", "session", "analysis", "walk", "ranges", "graphics", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -251,6 +252,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         result["soft"] = soft.measure(options.device[0])
     if "scans" in options.only or ((options.full or options.readme) and not options.only):
         result["scans"] = scans.measure(options.quick)
+    if "ranges" in options.only or ((options.full or options.readme) and not options.only):
+        result["ranges"] = ranges.measure(options.quick)
     for name, (group, title, part) in PARTS.items():
         everything = options.full or options.readme or group == "hard"
         if group in options.only or (everything and not options.only):

@@ -206,6 +206,29 @@ def scans(rows: list[Row] | None, path: Path, title: str) -> bool:
     return True
 
 
+def ranges(found: dict[str, Any] | None, path: Path, title: str) -> bool:
+    """Filling, discs and range images on the same scans: the processor's time against what is wrong, a line a surface, a dot a density."""
+    if not found:
+        return False
+    shown = (("PSNR, dB (upper left is better)", lambda e: e["color_psnr"]), ("normals off, °", lambda e: e["normal_mean_degrees"]),
+             ("coverage wrong, %", lambda e: 100.0 * (1.0 - e["coverage_iou"])))
+    figure, axes = plt.subplots(1, 3, figsize=(15, 5.2))
+    for axis, (label, value) in zip(axes, shown):
+        for number, name in enumerate(dict.fromkeys(row["surface"] for row in found["surfaces"])):
+            rows = [row for row in found["surfaces"] if row["surface"] == name]
+            axis.plot([row["work_ms"] for row in rows], [value(row["error"]) for row in rows], "o-", color=plt.get_cmap("tab10")(number), label=name)
+            for row in rows:
+                axis.annotate(count(row["points"]), (row["work_ms"], value(row["error"])), fontsize=7, xytext=(4, 4), textcoords="offset points")
+        axis.set(xscale="log", xlabel="the processor's ms a frame, without analysis", ylabel=label)
+        axis.grid(True, which="both", alpha=0.2)
+    axes[0].legend(fontsize=8)
+    figure.suptitle(f"Nine scans of a torus, 512 x 512: {title}", fontsize=10)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return True
+
+
 def draw(result: dict[str, Any], folder: Path) -> list[str]:
     """Draws what the run holds; the names of the files."""
     title = f"{result['processor']}, {result['cores']} cores, {result['date']}"
@@ -216,6 +239,7 @@ def draw(result: dict[str, Any], folder: Path) -> list[str]:
                        ("scaling.png", lambda path: scaling(result, path)),
                        ("passes.png", lambda path: passes(joined(result, "headline", "points"), path)),
                        ("scans.png", lambda path: scans(result.get("scans"), path, title)),
+                       ("ranges.png", lambda path: ranges(result.get("ranges"), path, title)),
                        ("soft.png", lambda path: soft(result.get("soft"), path)),
                        ("densities.png", lambda path: bool(scenes) and densities(scenes, path))):
         if done(folder / name):

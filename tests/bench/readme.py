@@ -247,6 +247,10 @@ def update(result: dict[str, Any], root: Path) -> str:
         import scans
         parts["scans"] = scans.markdown(result["scans"])
         plots.scans(result["scans"], root / ".pictures/scans.png", title)
+    if result.get("ranges"):
+        import ranges
+        parts |= {"ranges paper": ranges.paper(result["ranges"]), "ranges surfaces": ranges.surfaces(result["ranges"])}
+        plots.ranges(result["ranges"], root / ".pictures/ranges.png", title)
     if any(row["device"] != "cpu" for row in joined(result, "graphics")):
         parts["graphics"] = graphics(result)
     if any(row["threads"] > 1 for row in joined(result, "scaling")):

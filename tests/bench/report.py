@@ -114,6 +114,9 @@ def markdown(result: dict[str, Any]) -> str:
         rows = joined(result, group)
         if rows:
             text += [f"## {title}", "", errors_table(rows), ""]
+    if result.get("ranges"):
+        import ranges  # which imports this
+        text += [ranges.markdown(result["ranges"]), ""]
     if result.get("soft"):
         text += [soft.markdown(result["soft"]), ""]
     if result.get("scans"):
