@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 from .native import PatinaError
 
-DEVICES = {"auto": 'AUTO', "cpu": 'CPU', "cpu-scalar": 'CPU_SCALAR', "gl-egl": 'GL', "gl-osmesa": 'GL_SOFTWARE'}
+DEVICES = {"auto": 'AUTO', "cpu": 'CPU', "cpu-scalar": 'CPU_SCALAR', "gl-egl": 'GL', "gl-wgl": 'GL', "gl-osmesa": 'GL_SOFTWARE'}
 QUALITIES = {"refined": 'REFINED', "paper": 'PAPER'}
 SWITCHES = {"strict"}  # without a value
 _PREFIX = "--patina-"

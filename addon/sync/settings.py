@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 
 import bpy
@@ -13,7 +14,8 @@ from .camera import View
 from .world import World
 
 # Scene.patina.device → patina_device_desc.name
-DEVICES = {'AUTO': "auto", 'CPU': "cpu", 'CPU_SCALAR': "cpu-scalar", 'GL': "gl-egl", 'GL_SOFTWARE': "gl-osmesa"}
+DEVICES = {'AUTO': "auto", 'CPU': "cpu", 'CPU_SCALAR': "cpu-scalar", 'GL': "gl-wgl" if sys.platform == "win32" else "gl-egl",
+           'GL_SOFTWARE': "gl-osmesa"}
 
 
 @dataclass(frozen=True)

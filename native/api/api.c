@@ -46,7 +46,8 @@ float patina_progress_value(const patina_progress *progress) { return progress ?
 
 // ---- devices -----------------------------------------------------------------------------------------------------------
 
-// GL on a hardware driver, else the CPU: software GL is slower than our C (9 times on llvmpipe).
+// GL on a hardware driver, else the CPU: software GL is slower than our C (9 times on llvmpipe). Through EGL, which Linux has: no driver
+// of Windows was ever tried, so there it is taken by name alone.
 static int create_auto(const patina_device_desc *desc, patina_device **out)
 {
     if (pt_device_gl_create(desc, "gl-egl", out) == PATINA_OK) {
@@ -65,11 +66,12 @@ static int create_named(const patina_device_desc *desc, const char *name, patina
         return create_auto(desc, out);
     if (!strncmp(name, "cpu", 3))
         return pt_device_cpu_create(desc, name, out);
-    if (!strcmp(name, "gl-egl") || !strcmp(name, "gl-osmesa"))
+    if (!strcmp(name, "gl-egl") || !strcmp(name, "gl-osmesa") || !strcmp(name, "gl-wgl"))
         return pt_device_gl_create(desc, name, out);
     return pt_fail(
         NULL, PATINA_ERROR_ARGUMENT,
-        "device \"%s\": known are auto, cpu, cpu-scalar, cpu-sse42, cpu-avx2, cpu-avx512, cpu-neon, gl-egl, gl-osmesa", name);
+        "device \"%s\": known are auto, cpu, cpu-scalar, cpu-sse42, cpu-avx2, cpu-avx512, cpu-neon, gl-egl, gl-osmesa, gl-wgl",
+        name);
 }
 
 int patina_device_create(const patina_device_desc *desc, patina_device **out)

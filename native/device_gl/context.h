@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How a GL context comes to be. A context is made, used and destroyed in one thread; none of them needs a display or a
-// window, and none ever touches the host program's own.
+// window that is seen, and none ever touches the host program's own.
 #ifndef PT_GL_CONTEXT_H
 #define PT_GL_CONTEXT_H
 
@@ -19,6 +19,6 @@ struct pt_gl_context_ops {
 
 extern const struct pt_gl_context_ops pt_gl_context_egl;    // Linux: GPU drivers, Mesa's llvmpipe
 extern const struct pt_gl_context_ops pt_gl_context_osmesa; // Mesa's llvmpipe without EGL
-extern const struct pt_gl_context_ops pt_gl_context_wgl;    // Windows: a slot
+extern const struct pt_gl_context_ops pt_gl_context_wgl;    // Windows
 
 #endif

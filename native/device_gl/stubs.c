@@ -9,8 +9,6 @@ int pt_device_gl_create(const patina_device_desc *desc, const char *context, str
 #if defined(__APPLE__)
     return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED,
                    "OpenGL ends at 4.1 on macOS, and Patina needs 4.3: it computes on the processor");
-#elif defined(_WIN32)
-    return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED, "this build has no OpenGL: on Windows Patina computes on the processor");
 #else
     return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED, "this build has no OpenGL");
 #endif

@@ -93,7 +93,7 @@ static const char usage_behind[] =
     "  --pass NAME[,MIN,MAX]              what the picture shows in place of colours: depth, normal, source, shadow, line,\n"
     "                                     certainty, thickness or density; numbers by --ramp-colors, over a range that is "
     "told\n"
-    "  --device auto|cpu|cpu-scalar|cpu-sse42|cpu-avx2|cpu-avx512|cpu-neon|gl-egl|gl-osmesa\n"
+    "  --device auto|cpu|cpu-scalar|cpu-sse42|cpu-avx2|cpu-avx512|cpu-neon|gl-egl|gl-osmesa|gl-wgl\n"
     "  --threads N, --batch N             of the CPU device (0: automatic)\n"
     "  --repeat N                         then measure N frames, the camera turning one degree a frame\n"
     "  --stats json                       one JSON object on standard output\n"

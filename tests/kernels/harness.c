@@ -18,13 +18,18 @@ static const struct device_choice {
     uint32_t threads, batch;
     uint64_t memory_cap; // 1 byte: threads share one key plane
 } choices[] = {
-    {"cpu-scalar", 1, 0, 0}, {"cpu", 3, 1, 0},
+    {"cpu-scalar", 1, 0, 0},
+    {"cpu", 3, 1, 0},
 #if defined(__aarch64__)
     {"cpu-neon", 7, 3, 1},
 #else
     {"cpu-sse42", 2, 0, 0},  {"cpu-avx2", 7, 3, 1},  {"cpu-avx512", 1, 0, 0},
 #endif
+#if defined(_WIN32)
+    {"gl-wgl", 0, 0, 0},
+#else
     {"gl-egl", 0, 0, 0},     {"gl-osmesa", 0, 0, 0},
+#endif
 };
 enum { CHOICES = sizeof choices / sizeof choices[0] };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runs every case of a kernel test on every device, against the reference and against the first device.
 //
-//     test_NAME [--device cpu|cpu-scalar|cpu-sse42|cpu-avx2|cpu-avx512|cpu-neon|gl-egl|gl-osmesa|all]   (default: all)
+//     test_NAME [--device cpu|cpu-scalar|cpu-sse42|cpu-avx2|cpu-avx512|cpu-neon|gl-egl|gl-osmesa|gl-wgl|all]   (default: all)
 //
 // A device that cannot be had is printed ("skip DEVICE: reason") and counted as skipped. cpu-scalar always runs, and
 // first: what it computes is the baseline that the others must equal to the bit.

@@ -8,6 +8,8 @@
 
 #if defined(__aarch64__)
 static const char *const all_devices[] = {"cpu", "cpu-scalar", "cpu-neon", "gl-egl", "gl-osmesa"};
+#elif defined(_WIN32)
+static const char *const all_devices[] = {"cpu", "cpu-scalar", "cpu-sse42", "cpu-avx2", "cpu-avx512", "gl-wgl"};
 #else
 static const char *const all_devices[] = {"cpu", "cpu-scalar", "cpu-sse42", "cpu-avx2", "cpu-avx512", "gl-egl", "gl-osmesa"};
 #endif
