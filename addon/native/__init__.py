@@ -257,38 +257,39 @@ class Cloud(_Handle):
         """Other colours for the same points; no picture of them may be drawn meanwhile."""
         return Task("set_colors", self._handle, byref(_view(colors, self.count)), keep=(self, colors))
 
-    def _describe_analysis(self, neighbours: int, stations: np.ndarray | None, station: np.ndarray | None,
-                           keep_normals: bool, threads: int, free_space: bool, grid: tuple[np.ndarray, np.ndarray] | None
-                           ) -> abi.AnalysisDesc:
-        count = 0 if stations is None else len(stations)
+    def _describe_analysis(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
+                           keep_normals: bool = True, threads: int = 0, free_space: bool = False,
+                           grid: tuple[np.ndarray, np.ndarray] | None = None, by_grid: bool = False,
+                           scan: np.ndarray | None = None, directions: np.ndarray | None = None) -> tuple[abi.AnalysisDesc, tuple]:
+        """The description, and what it needs to stay."""
+        stations, directions = (None if places is None else np.ascontiguousarray(places, np.float64)
+                                for places in (stations, directions))
         row, column = grid or (None, None)
+        count, ways = (0 if places is None else len(places) for places in (stations, directions))
         return abi.AnalysisDesc(neighbours=neighbours, threads=threads, keep_normals=keep_normals, station_count=count,
                              stations=stations.ctypes.data if count else None, station=_view(station, self.count),
-                             free_space=free_space, row=_view(row, self.count), column=_view(column, self.count))
+                             free_space=free_space, row=_view(row, self.count), column=_view(column, self.count), grid=by_grid,
+                             scan=_view(scan, self.count), direction_count=ways,
+                             directions=directions.ctypes.data if ways else None), (self, stations, station, grid, scan, directions)
 
-    def analyse(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
-                keep_normals: bool = True, progress: Progress | None = None, threads: int = 0, free_space: bool = False,
-                grid: tuple[np.ndarray, np.ndarray] | None = None) -> None:
-        """Gives points normals, spacings and footprints of their own; as start_colors. stations: (n, 3) places of the
-        scanner that normals face, station: (count, 1) uint8 or uint16, which of them saw the point. free_space: marks points
-        that another station saw through; grid: row and column of each point, (count, 1) uint16, uint32 or int32."""
-        stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
-        self._call("analyse", byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads, free_space,
-                                                            grid)), _handle_of(progress))
+    def analyse(self, progress: Progress | None = None, **given: Any) -> None:
+        """Gives points normals, spacings and footprints of their own; as start_colors. given: neighbours; keep_normals; threads;
+        stations: (n, 3) places of the scanner that normals face; station: (count, 1) uint8 or uint16, which of them saw the point;
+        free_space: marks points that another station saw through; grid: row and column of each point, (count, 1) uint16, uint32 or
+        int32; by_grid: neighbours there tell surfaces and where these end; scan: in whose grid each lies, as station;
+        directions: (n, 3), in which scans looked whose beams are parallel, else 0."""
+        described, _kept = self._describe_analysis(**given)
+        self._call("analyse", byref(described), _handle_of(progress))
         self._learn()
 
-    def start_analysis(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
-                       keep_normals: bool = True, progress: Progress | None = None, free_space: bool = False,
-                       grid: tuple[np.ndarray, np.ndarray] | None = None, threads: int = 0) -> Task:
+    def start_analysis(self, progress: Progress | None = None, **given: Any) -> Task:
         """analyse, beside pictures: its result() changes the cloud, and no picture of it may be drawn then."""
         def apply(task: Task) -> None:
             task._call("apply")
             self._learn()
 
-        stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
-        return Task("analyse", self._handle,
-                    byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads, free_space, grid)),
-                    _handle_of(progress), keep=(self, stations, station, grid, progress), finish=apply)
+        described, kept = self._describe_analysis(**given)
+        return Task("analyse", self._handle, byref(described), _handle_of(progress), keep=(*kept, progress), finish=apply)
 
     def neighbourhoods(self, *names: str, neighbours: int = 16, progress: Progress | None = None,
                        threads: int = 0) -> dict[str, np.ndarray]:

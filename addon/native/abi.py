@@ -93,7 +93,8 @@ class CloudInfo(Descriptor):
 class AnalysisDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("neighbours", c_uint32), ("threads", c_uint32), ("keep_normals", c_uint32),
                 ("station_count", c_uint32), ("stations", c_void_p), ("station", Array), ("free_space", c_uint32),
-                ("row", Array), ("column", Array)]
+                ("row", Array), ("column", Array), ("grid", c_uint32), ("scan", Array), ("direction_count", c_uint32),
+                ("directions", c_void_p)]
 
 
 class Neighbourhoods(Descriptor):

@@ -7,6 +7,7 @@ from collections import OrderedDict
 
 import bpy
 import numpy as np
+from bpy.props import BoolProperty
 from bpy.types import Context, Event, Operator
 from mathutils import Matrix, Vector
 
@@ -34,6 +35,10 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
     bl_idname = "object.patina_analyze"
     bl_label = "Analyze"
     bl_options = {'REGISTER', 'UNDO'}
+
+    by_grid: BoolProperty(
+        name="By Scan Grid", default=False,
+        description="Neighbors in the rows and columns of each scan, not only those in space")
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -64,8 +69,11 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
             cloud = task.result()
             part = self._progress.part(1, 2)
             part.doing = analysis.label(cloud)
+            stations = analysis.stations(obj, obj.data, count, self.by_grid)
+            if self.by_grid and not (stations and stations.by_grid):
+                self.report({'WARNING'}, f"Patina: '{obj.name}': {analysis.NO_GRID}")
             with part.inner() as inner:
-                task = analyzing.start(cloud, analysis.stations(obj, obj.data, count), inner)
+                task = analyzing.start(cloud, stations, inner)
             yield task
             task.result()
         except native.PatinaCancelled:

@@ -238,6 +238,10 @@ class PatinaObjectProperties(PropertyGroup):
                                   "every frame, nor for range images, which need none", 0),
             ('ALWAYS', "Always", "Sequences and points that move too, in every frame", 1),
             ('OFF', "Off", "Nothing is computed ahead: one spacing holds for many points", 2)))
+    analysis_grid: BoolProperty(
+        name="By Scan Grid", override=_OVERRIDE, default=False,
+        description="Neighbors in the rows and columns of each scan tell normals and footprints, and that a surface ends where the "
+                    "scanner saw past it: true outlines, and nothing closed across a step in depth")
     d_min: FloatProperty(
         name="Layer Distance", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE',
         unit='LENGTH', precision=4,

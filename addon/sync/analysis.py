@@ -4,16 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from .. import native, styles
+from ..importers import scans
 from . import attributes, files, sequence
 
 SCANNERS = "patina_scanners"  # of the data: x, y, z of each, as the points' own coordinates
 SCAN, ROW, COLUMN = "scan", "row", "column"  # point attributes: by which of them, and where in its grid
+NO_GRID = "no scan says in which row and column each point lies and from where it was taken: neighbors in space tell all"
 
 # Modifiers whose points move without a curve of their own.
 _MOVING = {'ARMATURE', 'BUILD', 'CLOTH', 'DYNAMIC_PAINT', 'EXPLODE', 'FLUID', 'HOOK', 'MESH_SEQUENCE_CACHE', 'OCEAN',
@@ -26,6 +28,9 @@ class Stations:
     places: np.ndarray  # (n, 3) float64
     of_points: np.ndarray | None  # (count, 1) uint16: which of them saw each point; None: the nearest
     grid: tuple[np.ndarray, np.ndarray] | None = None  # (count, 1) uint32: row and column of each
+    by_grid: bool = False  # neighbors there tell surfaces, and where these end
+    scan: np.ndarray | None = None  # of scans without a place: (count, 1) uint16, in whose grid each lies; None: all in one
+    directions: np.ndarray | None = None  # (n, 3) float64, in which these looked
 
     @property
     def tells_free_space(self) -> bool:
@@ -36,15 +41,35 @@ def label(cloud: native.Cloud) -> str:
     return f"Analyzing {cloud.count:,} points"
 
 
-def wanted(obj: bpy.types.Object) -> bool:
-    """Whether the points of an object, evaluated or not, are to be analyzed."""
-    return obj.patina.analysis == 'ALWAYS' or obj.patina.analysis == 'AUTO' and not _moves(obj.original)
+def wanted(obj: bpy.types.Object) -> int:
+    """Whether the points of an object, evaluated or not, are to be analyzed: 0 not, 2 by their scans' grids, else 1."""
+    if not (obj.patina.analysis == 'ALWAYS' or obj.patina.analysis == 'AUTO' and not _moves(obj.original)):
+        return 0
+    return 2 if obj.patina.analysis_grid and not obj.patina.linked_file else 1
 
 
-def stations(obj: bpy.types.Object, data: bpy.types.ID, count: int) -> Stations | None:
+def stations(obj: bpy.types.Object, data: bpy.types.ID, count: int, by_grid: bool) -> Stations | None:
     """data: the object's, to read attributes from."""
-    known = obj.original.data.get(SCANNERS)
-    return of_columns(known, *(attributes.scalars(data, count, name) for name in (SCAN, ROW, COLUMN))) if known else None
+    known, told = obj.original.data.get(SCANNERS), obj.original.data.get(scans.PROPERTY)
+    if not known and not by_grid:
+        return None
+    columns = [attributes.scalars(data, count, name) for name in (SCAN, ROW, COLUMN)]
+    found = of_columns(known, *columns) if known else None
+    return gridded(found, scans.unpacked(told), *columns) if by_grid else found
+
+
+def gridded(found: Stations | None, told: list[scans.Scan], scan: np.ndarray | None, row: np.ndarray | None,
+            column: np.ndarray | None) -> Stations | None:
+    """With the neighbors in the scans' grids, where there are such: of scans whose places are known, or that tell their directions."""
+    grid = (_whole(row, 1 << 24, np.uint32), _whole(column, 1 << 24, np.uint32))
+    if grid[0] is None or grid[1] is None:
+        return found
+    if found is not None:
+        return replace(found, grid=grid, by_grid=True) if found.of_points is not None or len(found.places) == 1 else found
+    of = _whole(scan, len(told), np.uint16)
+    if not any(any(one.direction) for one in told) or of is None and len(told) > 1:
+        return None
+    return Stations(np.zeros((0, 3)), None, grid, True, of, np.array([one.direction for one in told], np.float64))
 
 
 def of_columns(places: Iterable[float], scan: np.ndarray | None = None, row: np.ndarray | None = None,

@@ -192,8 +192,9 @@ class Analyses:
 def start(cloud: native.Cloud, stations: Stations | None, progress: native.Progress, threads: int = 0) -> native.Task:
     if stations is None:
         return cloud.start_analysis(progress=progress, threads=threads)
-    return cloud.start_analysis(stations=stations.places, station=stations.of_points, progress=progress, threads=threads,
-                                free_space=stations.tells_free_space, grid=stations.grid)
+    return cloud.start_analysis(stations=stations.places if len(stations.places) else None, station=stations.of_points,
+                                progress=progress, threads=threads, free_space=stations.tells_free_space, grid=stations.grid,
+                                by_grid=stations.by_grid, scan=stations.scan, directions=stations.directions)
 
 
 def _closed(task: native.Task) -> bool:

@@ -618,10 +618,12 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     if obj.patina.hide_uncolored:
         opacities = attributes.without_uncolored(opacities, rgb)
     analyzed = analysis.wanted(obj)
-    stations = analysis.stations(obj, data, count) if analyzed else None
+    stations = analysis.stations(obj, data, count, analyzed == 2) if analyzed else None
+    if analyzed == 2 and not (stations and stations.by_grid):
+        notices.append(f"'{obj.name}': {analysis.NO_GRID}")
     scans, scan_of = linked.scans_in({name: column[:, 0] for name in linked.SCAN_NAMES
                                       if (column := attributes.scalars(data, count, name)) is not None})
-    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations, by, scans, scan_of)
+    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, bool(analyzed), stations, by, scans, scan_of)
 
 
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:

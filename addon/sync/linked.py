@@ -81,7 +81,7 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str], analyzed: b
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
-    scalar, wanted, shown = scalar_name(obj) or attribute_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored
+    scalar, wanted, shown = scalar_name(obj) or attribute_name(obj), bool(analysis.wanted(obj)), obj.patina.hide_uncolored
     found = source(path, origin, scalar, wanted, shown, pattern)
     if found and wanted and not analyzed and not found.kept.exists():
         bare = source(path, origin, scalar, False, shown, pattern)

@@ -201,7 +201,10 @@ class PATINA_PT_analysis(_PatinaObjectPanel, Panel):
         patina = context.object.patina
         layout.prop(patina, "analysis")
         if not patina.linked_file:
-            layout.operator("object.patina_analyze", text="Analyze to Attributes")
+            row = layout.row()
+            row.active = patina.analysis != 'OFF'
+            row.prop(patina, "analysis_grid")
+            layout.operator("object.patina_analyze", text="Analyze to Attributes").by_grid = patina.analysis_grid
         known = estimates.layer_distance(context.object.name_full)
         rows.automatic(layout, patina, "d_min",
                        otherwise="Automatic" if known is None else f"Automatic ({_length(context.scene, known)})")

@@ -6,7 +6,7 @@
 // A cell belongs to a window when a chain of cells leads to it from the middle without a step in depth: a step is more than
 // STEEP times the way across the rays and NOISE sigma. Sigma comes from the second differences along the columns. The window
 // grows where sigma is large beside the way from cell to cell, until the slope is known to LOOSE.
-#include "file.h"
+#include "grid.h"
 
 #include "base/descriptor.h"
 #include "base/progress.h"
@@ -21,24 +21,14 @@ static const double steep = 4;    // 76 degrees from the ray's own plane
 static const double noise = 4;    // sigmas that are no step
 static const double loose = 0.05; // of a slope: 3 degrees
 
-struct grid {
-    const struct pt_scan *scan;
-    const float *position; // of all points
-    double station[3];     // in the same coordinates
-    uint32_t *points;      // of each cell, column by column; NONE
-    double sigma;          // of a depth
-};
-
-enum { NONE = UINT32_MAX };
-
-static uint32_t point_at(const struct grid *g, int64_t column, int64_t row)
+uint32_t pt_grid_point(const struct pt_grid *g, int64_t column, int64_t row)
 {
     if (column < 0 || row < 0 || column >= g->scan->columns || row >= g->scan->rows)
-        return NONE;
+        return PT_GRID_NONE;
     return g->points[(uint64_t)column * g->scan->rows + (uint64_t)row];
 }
 
-static void place_of(const struct grid *g, uint32_t point, double p[3])
+static void place_of(const struct pt_grid *g, uint32_t point, double p[3])
 {
     for (int k = 0; k < 3; k++)
         p[k] = (double)g->position[3 * (size_t)point + (size_t)k];
@@ -46,8 +36,7 @@ static void place_of(const struct grid *g, uint32_t point, double p[3])
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// From p towards the scanner, of length 1.
-static void towards(const struct grid *g, const double p[3], double d[3])
+void pt_grid_towards(const struct pt_grid *g, const double p[3], double d[3])
 {
     for (int k = 0; k < 3; k++)
         d[k] = g->station[k] - (g->scan->parallel ? 0 : p[k]);
@@ -73,7 +62,7 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static double depth_of(const struct grid *g, uint32_t point)
+static double depth_of(const struct pt_grid *g, uint32_t point)
 {
     double p[3], d[3];
     place_of(g, point, p);
@@ -84,7 +73,7 @@ static double depth_of(const struct grid *g, uint32_t point)
     return sqrt(dot(d, d));
 }
 
-static int measure_noise(struct grid *g)
+int pt_grid_measure_noise(struct pt_grid *g)
 {
     uint64_t cells = (uint64_t)g->scan->columns * g->scan->rows, step = cells / MOST_SAMPLES + 1;
     double *samples = malloc(MOST_SAMPLES * sizeof *samples);
@@ -92,8 +81,8 @@ static int measure_noise(struct grid *g)
     if (!samples)
         return PATINA_ERROR_MEMORY;
     for (uint64_t i = 1; i + 1 < cells; i += step) {
-        if (i % g->scan->rows == 0 || (i + 1) % g->scan->rows == 0 || g->points[i - 1] == NONE || g->points[i] == NONE ||
-            g->points[i + 1] == NONE)
+        if (i % g->scan->rows == 0 || (i + 1) % g->scan->rows == 0 || g->points[i - 1] == PT_GRID_NONE ||
+            g->points[i] == PT_GRID_NONE || g->points[i + 1] == PT_GRID_NONE)
             continue;
         double bend = depth_of(g, g->points[i - 1]) - 2 * depth_of(g, g->points[i]) + depth_of(g, g->points[i + 1]);
         if (isfinite(bend))
@@ -113,7 +102,7 @@ struct window {
 };
 
 // How many cells the window must reach so that the slope is known well: its error is sigma / (way sqrt(sum of squares)).
-static int reach_of(const struct grid *g, double way)
+static int reach_of(const struct pt_grid *g, double way)
 {
     for (int r = 1; r < WIDEST; r++) {
         double squares = (2 * r + 1) * (2 * r + 1) * r * (r + 1) / 3.0;
@@ -126,17 +115,17 @@ static int reach_of(const struct grid *g, double way)
 static int sign(int v) { return (v > 0) - (v < 0); }
 
 // Takes in the cells of ring r that a cell of the ring within leads to; returns the mean way to those of them beside it.
-static double take_ring(const struct grid *g, struct window *w, int64_t column, int64_t row, int r, const double d[3])
+static double take_ring(const struct pt_grid *g, struct window *w, int64_t column, int64_t row, int r, const double d[3])
 {
     double sum = 0;
     int found = 0;
     for (int u = -r; u <= r; u++)
         for (int v = -r; v <= r; v += abs(u) == r ? 1 : 2 * r) {
             int a = u - sign(u) * (abs(u) == r), b = v - sign(v) * (abs(v) == r);
-            uint32_t point = point_at(g, column + u, row + v);
+            uint32_t point = pt_grid_point(g, column + u, row + v);
             double *q = w->at[WIDEST + u][WIDEST + v], way;
             w->in[WIDEST + u][WIDEST + v] = false;
-            if (point == NONE || !w->in[WIDEST + a][WIDEST + b])
+            if (point == PT_GRID_NONE || !w->in[WIDEST + a][WIDEST + b])
                 continue;
             place_of(g, point, q);
             double depth = depth_and_way(w->at[WIDEST + a][WIDEST + b], q, d, &way);
@@ -177,12 +166,12 @@ static bool fit(const struct window *w, int r, double by_column[3], double by_ro
     return true;
 }
 
-static void find_normal(const struct grid *g, int64_t column, int64_t row, float normal[3])
+void pt_grid_normal(const struct pt_grid *g, int64_t column, int64_t row, float normal[3])
 {
     struct window w;
     double d[3], a[3], b[3], *p = w.at[WIDEST][WIDEST];
-    place_of(g, point_at(g, column, row), p);
-    towards(g, p, d);
+    place_of(g, pt_grid_point(g, column, row), p);
+    pt_grid_towards(g, p, d);
     w.in[WIDEST][WIDEST] = true;
     int reach = reach_of(g, take_ring(g, &w, column, row, 1, d));
     for (int r = 2; r <= reach; r++)
@@ -209,7 +198,7 @@ static uint64_t value_at(const void *values, bool wide, uint64_t i)
 }
 
 // g: scan, position and station are set. Cancelled when the progress says so; the caller has the words for errors.
-static int find_normals(struct grid *g, const struct cells *cells, struct patina_progress *progress, float *normals)
+static int find_normals(struct pt_grid *g, const struct cells *cells, struct patina_progress *progress, float *normals)
 {
     const struct pt_scan *scan = g->scan;
     uint64_t count = (uint64_t)scan->columns * scan->rows;
@@ -224,13 +213,13 @@ static int find_normals(struct grid *g, const struct cells *cells, struct patina
         if (column < scan->columns && row < scan->rows)
             g->points[column * scan->rows + row] = (uint32_t)i;
     }
-    int code = measure_noise(g);
+    int code = pt_grid_measure_noise(g);
     for (uint64_t i = scan->first; i < scan->first + scan->count && !code; i++) {
         uint64_t column = value_at(cells->column, cells->wide, i), row = value_at(cells->row, cells->wide, i);
         if (i % POLL_POINTS == 0 && pt_progress_cancelled(progress))
             code = PATINA_ERROR_CANCELLED;
         if (column < scan->columns && row < scan->rows)
-            find_normal(g, (int64_t)column, (int64_t)row, normals + 3 * i);
+            pt_grid_normal(g, (int64_t)column, (int64_t)row, normals + 3 * i);
     }
     free(g->points);
     return code;
@@ -248,7 +237,7 @@ int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input)
     int code = file->normal ? PATINA_OK : PATINA_ERROR_MEMORY;
     const struct cells cells = {columns->data, rows->data, columns->type == PATINA_UINT32};
     for (uint32_t s = 0; s < file->scan_count && !code; s++) {
-        struct grid g = {.scan = &file->scans[s], .position = file->position};
+        struct pt_grid g = {.scan = &file->scans[s], .position = file->position};
         for (int k = 0; k < 3; k++)
             g.station[k] = g.scan->station[k] - (g.scan->parallel ? 0 : file->origin[k]);
         code = find_normals(&g, &cells, input->progress, file->normal);
@@ -270,7 +259,7 @@ int patina_grid_normals(const patina_grid_desc *given, patina_progress *progress
     if (!given || (desc->count && !(desc->position && desc->column && desc->row && normals)))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grid_normals: bad arguments");
     struct pt_scan scan = {.count = desc->count};
-    struct grid g = {.scan = &scan, .position = desc->position};
+    struct pt_grid g = {.scan = &scan, .position = desc->position};
     memcpy(g.station, desc->station, sizeof g.station);
     if (desc->count)
         memset(normals, 0, desc->count * 3 * sizeof *normals);

@@ -2,6 +2,7 @@
 #include "analysis.h"
 #include "beams.h"
 #include "free_space.h"
+#include "grids.h"
 #include "kernel_args.h"
 #include "base/compare.h"
 #include "base/descriptor.h"
@@ -23,6 +24,7 @@ struct walk {
     struct pt_analysis *out;
     struct pt_neighbours tree, coarse;
     struct pt_beams beams;
+    struct pt_grids grids;
     patina_progress *progress;
     uint32_t k;
     int rows;  // without stations: the cloud's samples lie in rows, far apart
@@ -166,9 +168,11 @@ struct limited { // by a chunk's beams
 static void limit_point(void *context, uint32_t place, const struct pt_sample *sample, struct pt_neighbourhood *hood)
 {
     const struct limited *limited = context;
+    const uint32_t slot = limited->walk->tree.slots[place];
     double p[3];
-    const struct pt_beam *beam = beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk],
-                                         limited->walk->tree.slots[place], p);
+    const struct pt_beam *beam = beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk], slot, p);
+    if (pt_grids_describe(&limited->walk->grids, limited->walk->desc, slot, limited->walk->cloud->order[slot], hood))
+        return;
     if (beam)
         pt_beam_limit(beam, p, sample, hood);
     else if (!limited->walk->rows)
@@ -212,7 +216,7 @@ static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, 
     const struct pt_beam *beam = beam_of(walk, chunk, slot, p);
     tally->kinds[hood->kind]++;
     if (hood->has_normal && !(walk->desc->keep_normals && given != PT_NORMAL_NONE)) {
-        tally->unoriented += !orient(beam, p, given, hood->normal);
+        tally->unoriented += !orient(beam, p, given, hood->normal) && !hood->sided;
         tally->estimated++;
         bits = pt_encode_normal(hood->normal);
     }
@@ -292,6 +296,7 @@ static int check_arrays(patina_analysis_desc *desc)
     const uint32_t lines = 1u << PATINA_UINT16 | 1u << PATINA_UINT32 | 1u << PATINA_INT32;
     int error = pt_check_array(&desc->station, "station", 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1);
     error = error ? error : pt_check_array(&desc->row, "row", lines, 1, 1);
+    error = error ? error : pt_check_array(&desc->scan, "scan", 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1);
     return error ? error : pt_check_array(&desc->column, "column", lines, 1, 1);
 }
 
@@ -307,6 +312,15 @@ int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *des
     for (uint32_t i = 0; i < 3 * desc->station_count; i++)
         if (!isfinite(desc->stations[i]))
             return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: station %u is nowhere", i / 3);
+    if (desc->direction_count && !desc->directions)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: no directions of %u scans", desc->direction_count);
+    for (uint32_t i = 0; i < 3 * desc->direction_count; i++)
+        if (!isfinite(desc->directions[i]))
+            return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: the direction of scan %u is not finite", i / 3);
+    if (desc->grid && !(desc->row.data && desc->column.data))
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: grid needs row and column of each point");
+    if (desc->grid && !desc->station_count && !desc->direction_count)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: grid needs stations, or directions of scans");
     patina_analysis_desc checked = *desc;
     const int error = check_arrays(&checked);
     return error ? error : pt_free_space_check(desc);
@@ -375,6 +389,8 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     out->spacing_base = base_of(cloud);
     int error = pt_beams_create(cloud, walk->desc, pool, &walk->beams);
     if (!error)
+        error = pt_grids_create(cloud, walk->desc, pool, walk->progress, &walk->grids);
+    if (!error)
         error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, pool, walk->progress, 0.0, 0.04);
     if (!error)
         error = pt_neighbours_create(&walk->coarse, cloud, FAR_STRATA, pool, walk->progress, 0.04, 0.05);
@@ -422,6 +438,7 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
     int error = pool ? compute(&walk, pool) : PATINA_ERROR_MEMORY;
     pt_pool_destroy(pool);
     pt_beams_destroy(&walk.beams);
+    pt_grids_destroy(&walk.grids);
     free(walk.tallies);
     if (error)
         pt_analysis_free(out);

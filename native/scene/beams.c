@@ -61,20 +61,6 @@ static void carry(const double v[3], const double ray[3], const double n[3], dou
         out[k] = v[k] - along * ray[k];
 }
 
-// The axes of the ellipse that has a and b for conjugate half diameters; returns the greater's direction in `axis`.
-static void ellipse_of(const double a[3], const double b[3], double axis[3], double *major, double *minor)
-{
-    const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), half = 0.5 * (aa - bb), root = sqrt(half * half + ab * ab);
-    const double turn = 0.5 * pt_atan2(ab, half), c = pt_cos(turn), s = pt_sin(turn);
-    for (int k = 0; k < 3; k++)
-        axis[k] = c * a[k] + s * b[k];
-    *major = sqrt(0.5 * (aa + bb) + root);
-    *minor = sqrt(fmax(0.5 * (aa + bb) - root, 0.0));
-    const double length = sqrt(dot(axis, axis));
-    for (int k = 0; k < 3; k++)
-        axis[k] = length > 0.0 ? axis[k] / length : a[k];
-}
-
 // Whether neighbours lie beside the point on both sides along the cell's first direction, and along its second: within an
 // interval and a half, no farther off the plane than NEAR of one.
 static void look_beside(const struct pt_sample *sample, const double ray[3], const double n[3], double facing,
@@ -136,7 +122,7 @@ void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct p
         a[k] *= interval->even ? CELL_CAMERA : beside[0] ? CELL : CELL_BORDER;
         b[k] *= interval->even ? CELL_CAMERA : beside[1] ? CELL : CELL_BORDER;
     }
-    ellipse_of(a, b, axis, &major, &minor);
+    pt_ellipse_of(a, b, axis, &major, &minor);
     if (!(major * minor < hood->major * hood->minor))
         return;
     hood->spacing = fmin(hood->spacing, sqrt(major * minor) / CELL);

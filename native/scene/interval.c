@@ -61,7 +61,7 @@ uint32_t pt_station_of(const patina_analysis_desc *desc, uint32_t number, const 
 
 // ---- counting --------------------------------------------------------------------------------------------------------------
 
-static uint32_t line_at(const patina_array *array, uint64_t number)
+uint32_t pt_line_at(const patina_array *array, uint64_t number)
 {
     const char *at = (const char *)array->data + number * array->stride;
     uint32_t wide;
@@ -104,7 +104,7 @@ static void measure_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
         for (uint32_t i = 0; i < chunk->count; i++) {
             const uint32_t number = count->cloud->order[chunk->first + i];
             struct lines *lines = &count->lines[look(count, chunk, i, d)];
-            const uint32_t row = line_at(&count->desc->row, number), column = line_at(&count->desc->column, number);
+            const uint32_t row = pt_line_at(&count->desc->row, number), column = pt_line_at(&count->desc->column, number);
             most(&lines->rows, row < LINES_MOST ? row + 1 : LINES_MOST + 1);
             most(&lines->columns, column < LINES_MOST ? column + 1 : LINES_MOST + 1);
         }
@@ -135,8 +135,8 @@ static void count_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
             atomic_fetch_add_explicit(&count->bins[(size_t)s * BINS + row * TURNS + column], 1, memory_order_relaxed);
             if (!count->lines[s].row || !(flat > 0.0))
                 continue;
-            add_line(&count->lines[s].row[line_at(&count->desc->row, number)], pt_atan2(d[2], sqrt(flat)), 0.0);
-            add_line(&count->lines[s].column[line_at(&count->desc->column, number)], d[0] / sqrt(flat), d[1] / sqrt(flat));
+            add_line(&count->lines[s].row[pt_line_at(&count->desc->row, number)], pt_atan2(d[2], sqrt(flat)), 0.0);
+            add_line(&count->lines[s].column[pt_line_at(&count->desc->column, number)], d[0] / sqrt(flat), d[1] / sqrt(flat));
         }
     }
 }

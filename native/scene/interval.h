@@ -17,5 +17,7 @@ int pt_intervals_find(const struct patina_cloud *cloud, const patina_analysis_de
 
 // The station of a point by its number in the caller's order; without the caller's word the nearest to p.
 uint32_t pt_station_of(const patina_analysis_desc *desc, uint32_t number, const double p[3]);
+// Its row or column; what is below 0 is far beyond any.
+uint32_t pt_line_at(const patina_array *array, uint64_t number);
 
 #endif

@@ -120,6 +120,19 @@ static int is_stray(const struct pt_sample *sample, struct pt_neighbourhood *out
     return 1;
 }
 
+void pt_ellipse_of(const double a[3], const double b[3], double axis[3], double *major, double *minor)
+{
+    const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), half = 0.5 * (aa - bb), root = sqrt(half * half + ab * ab);
+    const double turn = 0.5 * pt_atan2(ab, half), c = pt_cos(turn), s = pt_sin(turn);
+    for (int k = 0; k < 3; k++)
+        axis[k] = c * a[k] + s * b[k];
+    *major = sqrt(0.5 * (aa + bb) + root);
+    *minor = sqrt(fmax(0.5 * (aa + bb) - root, 0.0));
+    const double length = sqrt(dot(axis, axis));
+    for (int k = 0; k < 3; k++)
+        axis[k] = length > 0.0 ? axis[k] / length : a[k];
+}
+
 // ---- on the plane ------------------------------------------------------------------------------------------------------------
 
 struct flat {

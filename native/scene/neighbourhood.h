@@ -21,8 +21,8 @@ struct pt_plane { // of the point and those of its neighbours that `inside` mark
 #define PT_UNEVEN_ROWS 3.5 // pt_neighbourhood.uneven of rows: nine in ten random points show less
 
 struct pt_neighbourhood {
-    uint32_t kind; // PT_KIND_*
-    int has_normal;
+    uint32_t kind;             // PT_KIND_*
+    int has_normal, sided;     // sided: the normal is known to be on its side
     double normal[3], axis[3]; // axis: of the greater half axis, on the plane
     double major, minor;       // half axes of the footprint; 0: none
     double spacing, sigma;     // 0: unknown
@@ -54,6 +54,8 @@ int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_p
 // Bounds the footprint of a point by how far its neighbours lie from each other: strays, leaves, bars of a railing and wires lie
 // farther from others than these do.
 void pt_neighbourhood_bound(const struct pt_sample *sample, struct pt_neighbourhood *hood);
+// The axes of the ellipse that has a and b for conjugate half diameters; the greater's direction in `axis`.
+void pt_ellipse_of(const double a[3], const double b[3], double axis[3], double *major, double *minor);
 void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *plane, struct pt_neighbourhood *out);
 
 #endif

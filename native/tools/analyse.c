@@ -92,7 +92,8 @@ static int write_ply(const char *path, const struct columns *c, const double ori
     return pt_whole_end(&whole, good);
 }
 
-static int analyse(const char *in, const char *out, uint32_t neighbours, patina_progress *progress, struct columns *columns)
+static int analyse(const char *in, const char *out, uint32_t neighbours, int grid, patina_progress *progress,
+                   struct columns *columns)
 {
     patina_file *file = NULL;
     patina_cloud *cloud = NULL;
@@ -112,6 +113,8 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, patina_
     if (!code)
         code = tool_take_stations(file, &stations);
     tool_describe_stations(&stations, &desc);
+    if (grid && !code)
+        tool_use_grid(&stations, in, &desc);
     desc.free_space = desc.station_count > 1; // one alone sees through nothing
     if (!code)
         code = patina_cloud_analyse(cloud, &desc, progress);
@@ -150,6 +153,7 @@ int tool_analyse(int count, char **arguments)
 {
     const char *in = NULL, *out = NULL;
     double neighbours = 0;
+    int grid = 0;
     for (int i = 0; i < count; i++) {
         const char *value = i + 1 < count ? arguments[i + 1] : NULL;
         if (arguments[i][0] != '-') {
@@ -159,6 +163,8 @@ int tool_analyse(int count, char **arguments)
         } else if (!strcmp(arguments[i], "-o") && value) {
             out = value;
             i++;
+        } else if (!strcmp(arguments[i], "--grid")) {
+            grid = 1;
         } else if (!strcmp(arguments[i], "--neighbours") && value) {
             if (parse_numbers(value, &neighbours, 1, 1) < 0 || neighbours < 3 || neighbours > 64)
                 return tool_misuse("'%s' is no value for option '--neighbours': 3 to 64", value);
@@ -173,7 +179,7 @@ int tool_analyse(int count, char **arguments)
     struct columns columns = {0};
     const int code = patina_progress_create(&progress);
     tool_cancellable(progress, NULL);
-    const int result = code ? tool_failed(in, NULL, code) : analyse(in, out, (uint32_t)neighbours, progress, &columns);
+    const int result = code ? tool_failed(in, NULL, code) : analyse(in, out, (uint32_t)neighbours, grid, progress, &columns);
     tool_cancellable(NULL, NULL);
     tool_drain_log(1);
     patina_progress_destroy(progress);

@@ -310,7 +310,7 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     else if (!strcmp(name, "--surface"))
         bad = parse_word(value, "auto|splats|fill|ranges", &s->surface);
     else if (!strcmp(name, "--analysis"))
-        bad = parse_word(value, "auto|on|off", &o->analysis);
+        bad = parse_word(value, "auto|on|off|grid", &o->analysis);
     else if (!strcmp(name, "--radius"))
         bad = parse_width(value, &o->radius);
     else if (!strcmp(name, "--range-gamma"))

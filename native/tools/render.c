@@ -93,7 +93,7 @@ static int needs_analysis(const struct tool_options *options, int has_normals)
            options->pass == PATINA_PASS_CERTAINTY || options->pass == PATINA_PASS_THICKNESS;
 }
 
-static int analyse(struct job *job, patina_cloud *cloud, const struct tool_stations *stations)
+static int analyse(struct job *job, patina_cloud *cloud, const char *path, const struct tool_stations *stations)
 {
     patina_analysis_desc desc = {.struct_size = sizeof desc, .threads = job->options.threads, .keep_normals = 1};
     tool_describe_stations(stations, &desc);
@@ -104,6 +104,8 @@ static int analyse(struct job *job, patina_cloud *cloud, const struct tool_stati
         (job->options.analysis == TOOL_ANALYSED_WHERE_NEEDED && !needs_analysis(&job->options, (int)info.has_normals)))
         return error;
     const double start = pt_milliseconds();
+    if (job->options.analysis == TOOL_ANALYSED_BY_GRID)
+        tool_use_grid(stations, path, &desc);
     const int code = patina_cloud_analyse(cloud, &desc, job->progress);
     job->analysis_ms += pt_milliseconds() - start;
     return code;

@@ -29,26 +29,46 @@ static int read_numbers(const patina_file *file, const char *name, int32_t **out
     return code;
 }
 
+// Directions of scans whose beams are parallel; without any, none.
+static int read_directions(const patina_file *file, uint32_t scans, struct tool_stations *out)
+{
+    int some = 0, code = PATINA_OK;
+    out->directions = calloc((size_t)scans + 1, 3 * sizeof *out->directions);
+    for (uint32_t i = 0; i < scans && out->directions && !code; i++) {
+        patina_file_scan scan = {.struct_size = sizeof scan};
+        code = patina_file_get_scan(file, i, &scan);
+        for (int k = 0; k < 3 && !code && !scan.has_station; k++) {
+            out->directions[3 * i + (uint32_t)k] = scan.direction[k];
+            some |= scan.direction[k] != 0;
+        }
+    }
+    out->direction_count = some ? scans : 0;
+    return code || out->directions ? code : PATINA_ERROR_MEMORY;
+}
+
 int tool_take_stations(const patina_file *file, struct tool_stations *out)
 {
     patina_file_info info = {.struct_size = sizeof info};
     int32_t *scan = NULL;
     *out = (struct tool_stations){0};
     int code = patina_file_get_info(file, &info);
-    if (code || !info.stations || info.stations > UINT16_MAX)
+    if (code || info.stations > UINT16_MAX || info.scans > UINT16_MAX)
         return code;
     code = read_numbers(file, "scan", &scan);
-    if (!code && !scan && info.stations > 1)
+    if (!code && !scan && (info.stations != 1 && info.scans != 1))
         return PATINA_OK; // whose points are whose is not known
     out->count = info.stations;
-    out->places = malloc(3 * sizeof(double) * info.stations);
+    out->places = malloc(3 * sizeof(double) * info.stations + 1);
     out->station = calloc(info.count + 1, sizeof *out->station);
     if (!code)
-        code = out->places && out->station ? patina_file_read_stations(file, out->places, 3 * sizeof(double) * info.stations)
-                                           : PATINA_ERROR_MEMORY;
+        code = out->places && out->station ? PATINA_OK : PATINA_ERROR_MEMORY;
+    if (!code && info.stations)
+        code = patina_file_read_stations(file, out->places, 3 * sizeof(double) * info.stations);
     for (uint64_t i = 0; i < info.count && scan && !code; i++)
         out->station[i] = scan[i] >= 0 && scan[i] < UINT16_MAX ? (uint16_t)scan[i] : UINT16_MAX;
     free(scan);
+    if (!code && !info.stations)
+        code = read_directions(file, info.scans, out);
     if (!code)
         code = read_numbers(file, "row", &out->row);
     return code ? code : read_numbers(file, "column", &out->column);
@@ -90,11 +110,15 @@ int tool_take_scans(const patina_file *file, const patina_cloud *cloud, struct t
 
 void tool_describe_stations(const struct tool_stations *stations, patina_analysis_desc *desc)
 {
-    if (!stations->count)
+    if (!stations->station)
         return;
+    const patina_array scan = {.data = stations->station, .type = PATINA_UINT16, .components = 1};
     desc->station_count = stations->count;
-    desc->stations = stations->places;
-    desc->station = (patina_array){.data = stations->station, .type = PATINA_UINT16, .components = 1};
+    desc->stations = stations->count ? stations->places : NULL;
+    desc->station = stations->count ? scan : desc->station;
+    desc->scan = scan;
+    desc->direction_count = stations->direction_count;
+    desc->directions = stations->directions;
     desc->row = (patina_array){.data = stations->row, .type = PATINA_INT32, .components = 1};
     desc->column = (patina_array){.data = stations->column, .type = PATINA_INT32, .components = 1};
 }
@@ -107,3 +131,4 @@ void tool_free_stations(struct tool_stations *stations)
     free(stations->column);
     *stations = (struct tool_stations){0};
 }
+    free(stations->directions);

@@ -40,7 +40,7 @@ int tool_cancelled(void);
 // ---- options -----------------------------------------------------------------------------------------------------
 
 enum tool_view { VIEW_ANGLES, VIEW_LOOK };
-enum tool_analysis { TOOL_ANALYSED_WHERE_NEEDED, TOOL_ANALYSED, TOOL_UNANALYSED };
+enum tool_analysis { TOOL_ANALYSED_WHERE_NEEDED, TOOL_ANALYSED, TOOL_UNANALYSED, TOOL_ANALYSED_BY_GRID };
 
 enum { TOOL_OPACITIES = 64, TOOL_MESHES = 64, TOOL_CLIPS = 64, TOOL_TILES = 65536 };
 
@@ -132,11 +132,11 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
 
 // ---- clouds --------------------------------------------------------------------------------------------------------
 
-// What a file knows of its scanner; count 0: nothing.
+// What a file knows of its scanner; station NULL: nothing.
 struct tool_stations {
-    uint32_t count;
-    double *places;
-    uint16_t *station;     // of each point
+    uint32_t count, direction_count; // of stations; of scans whose beams are parallel, where there is no station
+    double *places, *directions;
+    uint16_t *station;     // scan of each point
     int32_t *row, *column; // NULL: not known
 };
 

@@ -247,8 +247,16 @@ typedef struct patina_analysis_desc {
                             // a station's directions, 128 MiB at most; what all stations saw stays
                             // with the cloud, 64 MiB at most
     patina_array row,
-        column; // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell footprints and free
-                // space how far apart the directions are. Optional: else found from how dense they are
+        column;    // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell footprints and free
+                   // space how far apart the directions are. Optional: else found from how dense they are
+    uint32_t grid; // 1 = neighbours in its scan's grid, and not those in space alone, tell a point's normal and footprint, and
+                   // that a surface ends where depth steps behind it or nothing came back. Needs row and column, and
+                   // for each scan where it was taken from: stations, or directions. 16 bytes a point and 4 a
+                   // cell meanwhile. Points that lie in no cell, or in one with another point, are as without it
+    patina_array scan; // with grid: in whose each point lies, 1 x UINT8/UINT16. Optional: `station` else; without both all
+                       // lie in one
+    uint32_t direction_count; // with grid, of scans whose beams are parallel, and whose place nobody knows: ...
+    const double *directions; // ... in which each looked, 3 each, any length; 0 0 0: it has a station
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes

@@ -2,7 +2,7 @@
 """Draws the virtual scans with the library and holds the pictures against the exact ones.
 
     build/out/venv/bin/python tests/truth/scans/run.py [--scenes a,b | tuning | held | all] [--cameras 0,3]
-        [--analysis off|on|stations|free] [--set surface=1]... [--style radius=0.02]... [--effect ...]... [--hook FILE.py]
+        [--analysis off|on|stations|free|grid] [--set surface=1]... [--style radius=0.02]... [--effect ...]... [--hook FILE.py]
         [--pictures FOLDER] [--json FILE]
 
 The library is $PATINA_LIBRARY, else build/out/release/libpatina.so. A hook is a Python file with any of
@@ -57,10 +57,12 @@ class Drawer:
         made = make(self.native, scan, stage.scene) if make else \
             self.native.Cloud(np.ascontiguousarray(scan.position, np.float32), None, np.ascontiguousarray(scan.color))
         if self.analysis != "off" and hasattr(made, "analyse") and not make:
-            known = self.analysis in ("stations", "free") and len(scan.stations) > 0
+            known = self.analysis in ("stations", "free", "grid") and len(scan.stations) > 0
+            by_grid = known and self.analysis == "grid"
             made.analyse(stations=scan.stations if known else None,
                          station=scan.scan.astype(np.uint8)[:, None] if known else None,
-                         free_space=known and self.analysis == "free")
+                         free_space=known and self.analysis == "free", by_grid=by_grid,
+                         grid=(_lines(scan.row), _lines(scan.column)) if by_grid else None)
             if self.analysis == "free":
                 self.style.setdefault("free_space", 2)
         getattr(self.hook, "after", lambda *_: None)(self.native, made, stage.scene)
@@ -87,6 +89,10 @@ class Drawer:
             if k:
                 best = (min(best[0], 1e3 * (time.perf_counter() - began)), min(best[1], 1e3 * (time.process_time() - spent)))
         return self.frame.read("COMBINED")[..., :3], self.frame.read("DEPTH")[..., 0], best
+
+
+def _lines(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values, np.int32)[:, None]
 
 
 def _fields(given: list[str]) -> dict[str, Any]:
@@ -194,8 +200,9 @@ def main() -> int:
     parser.add_argument("--hook", help="a Python file, see above")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--analysis", choices=("off", "on", "stations", "free"), default="on",
-                        help="what every point knows, where the library finds it out; with the scanners' places; and without what they saw through")
+    parser.add_argument("--analysis", choices=("off", "on", "stations", "free", "grid"), default="on",
+                        help="what every point knows, where the library finds it out; with the scanners' places; without what they "
+                        "saw through; and with neighbours in their grids")
     parser.add_argument("--times", type=int, default=1, help="timed frames a camera; the least counts")
     parser.add_argument("--still", action="store_true", help="no flicker")
     parser.add_argument("--pictures", type=Path, help="truth, picture, errors and ceiling of each camera go here as PNG")
