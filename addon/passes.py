@@ -133,6 +133,7 @@ PASSES = (
     RenderPass("Certainty", 1, "X", 'VALUE', "CERTAINTY", lambda layer: layer.patina.use_pass_certainty),
     RenderPass("Thickness", 1, "X", 'VALUE', "THICKNESS", lambda layer: layer.patina.use_pass_thickness),
     RenderPass("Density", 1, "X", 'VALUE', "DENSITY", lambda layer: layer.patina.use_pass_density),
+    RenderPass("Disagreement", 1, "X", 'VALUE', "DISAGREEMENT", lambda layer: layer.patina.use_pass_disagreement),
     *(item for number in range(1, MOST_LAYERS + 1) for item in _of_layer(number)),
     *(_mattes(kind, number) for kind in cryptomatte.KINDS for number in range(cryptomatte.MOST_RANKS // 2)),
 )

@@ -373,6 +373,7 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
         scene.add_light(**asdict(light))
     for clip in description.clips:
         scene.add_clip(**asdict(clip))
+    as_ranges = native.abi.SURFACE["RANGES"]
     for item in description.clouds:
         style = item.style
         if style.color_source == SCALAR and not item.cloud.has_scalars:  # a notice has said so
@@ -382,7 +383,8 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
         if softened:
             histogram.note(item.name, softened, parted)
         scene.add_cloud(item.cloud, mask=edits.mask_of(item.cloud, item.edits), grade=edits.grade_of(item.cloud, item.edits),
-                        field=parted, scans=ranges.scans_of(item.cloud, item.told),
+                        field=parted,
+                        scans=ranges.scans_of(item.cloud, item.told, as_ranges in (style.surface, description.settings.surface)),
                         **asdict(style),
                         **(dict(softened.style) if softened else {}))
     for item in description.meshes:

@@ -16,7 +16,7 @@ MAX_LAYERS = 16
 
 # patina_pass: name → (number, channels)
 PASSES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1), "LINE": (5, 1),
-          "CERTAINTY": (6, 1), "THICKNESS": (7, 1), "DENSITY": (8, 1)}
+          "CERTAINTY": (6, 1), "THICKNESS": (7, 1), "DENSITY": (8, 1), "DISAGREEMENT": (9, 1)}
 
 ERROR = {"OK": 0, "ERROR_ARGUMENT": -1, "ERROR_MEMORY": -2, "ERROR_FILE": -3, "ERROR_FORMAT": -4, "ERROR_UNSUPPORTED": -5,
          "ERROR_DEVICE": -6, "ERROR_CANCELLED": -7, "ERROR_TOO_MANY_POINTS": -8, "ERROR_EMPTY": -9, "ERROR_INTERNAL": -10}

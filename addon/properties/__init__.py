@@ -356,6 +356,10 @@ class PatinaViewLayerProperties(PropertyGroup):
         name="Density", default=False, update=_update_passes, override=_OVERRIDE,
         description="How many soft points lie before the surface, for each square of the scene's unit across the view: what an "
                     "X-ray shows. 0 where there are none")
+    use_pass_disagreement: BoolProperty(
+        name="Disagreement", default=False, update=_update_passes, override=_OVERRIDE,
+        description="How far scans lie apart where range images show them, in the scene's units, along the surface's normal: what "
+                    "registration is off by. 0 where one scan is alone, or which scan a point is of is not known")
     pass_layers: IntProperty(
         name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
         description="Color, depth and normal of so many layers of surface, the nearest first, as passes of their own; "

@@ -46,12 +46,14 @@ def told_of(obj: bpy.types.Object, surface: str) -> str:
     return told if isinstance(told, str) else ""
 
 
-def scans_of(cloud: native.Cloud, told: str) -> ScanSet | None:
-    """Any thread. None where nothing is known of the scans that the points are of."""
+def scans_of(cloud: native.Cloud, told: str, used: bool) -> ScanSet | None:
+    """Any thread. None where nothing is known of the scans that the points are of; used: the cloud is drawn as range images."""
+    if not used:
+        return None
     known = scans.unpacked(told) if told else []
     of = edits.scans_of(cloud)
     numbers = cloud.scan_numbers if of is not None else (0,)
     records = [(known[number].direction, known[number].interval) if number < len(known) else (scans.UNKNOWN, 0.0) for number in numbers]
-    if not any(any(direction) or interval for direction, interval in records):
+    if of is None and not any(any(direction) or interval for direction, interval in records):
         return None
     return edits.keep(cloud, ("scans", told, cloud.scan_stamp), lambda: ScanSet(cloud, of, records))

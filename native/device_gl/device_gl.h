@@ -155,8 +155,8 @@ void pt_gl_set_lights(struct pt_gl_device *d, GLuint program, const struct shade
 typedef int pt_gl_runner(struct pt_gl_device *d, const struct pt_gl_work *work);
 int pt_gl_is_pointwise(enum pt_kernel kernel); // pointwise.c runs it
 pt_gl_runner pt_gl_pointwise;
-pt_gl_runner pt_gl_raster, pt_gl_scatter, pt_gl_splat, pt_gl_blend, pt_gl_average, pt_gl_merge, pt_gl_points, pt_gl_fill,
-    pt_gl_shade, pt_gl_antialias, pt_gl_push, pt_gl_lines, pt_gl_gather, pt_gl_soft;
+pt_gl_runner pt_gl_raster, pt_gl_scatter, pt_gl_splat, pt_gl_blend, pt_gl_average, pt_gl_merge, pt_gl_differ, pt_gl_points,
+    pt_gl_fill, pt_gl_shade, pt_gl_antialias, pt_gl_push, pt_gl_lines, pt_gl_gather, pt_gl_soft;
 int pt_gl_points_of(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t variant);
 // The picture from what is shaded: smooth, antialias and compose at once, whose passes these are.
 int pt_gl_finish(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded);

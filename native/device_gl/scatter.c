@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of the kernels that walk points, in batches where a cloud is larger than a storage block. scatter: two 32-bit
-// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend, average, merge: a pass a band of rows; lit, sift,
+// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend, average, merge, differ: a pass a band of rows; lit, sift,
 // center, average: one instance.
 #include "device_gl.h"
 
@@ -307,7 +307,7 @@ int pt_gl_blend(struct pt_gl_device *d, const struct pt_gl_work *work)
     return result;
 }
 
-// Of average and merge, whose arguments begin with their view.
+// Of average, merge and differ, whose arguments begin with their view.
 static int mean_band(struct pt_gl_device *d, const struct instance_buffers *b, uint32_t first, uint32_t end)
 {
     const struct view_args *view = b->work->arguments;
@@ -347,6 +347,11 @@ int pt_gl_average(struct pt_gl_device *d, const struct pt_gl_work *work)
 int pt_gl_merge(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     return means(d, work, PT_BUF_merge_chunks, PT_BIND_merge_sums);
+}
+
+int pt_gl_differ(struct pt_gl_device *d, const struct pt_gl_work *work)
+{
+    return means(d, work, PT_BUF_differ_chunks, PT_BIND_differ_sums);
 }
 
 int pt_gl_points_of(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t variant)

@@ -159,6 +159,7 @@ void pt_plan_blend_light(struct pt_builder *builder);    // once shadow words ar
 
 // ranges.c: instances that are drawn as range images, over the keys of the others.
 void pt_plan_ranges(struct pt_builder *builder);
+void pt_plan_reveal(struct pt_builder *builder); // beside pt_plan_assess: how far their scans lie apart
 
 // average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.
 void pt_plan_average(struct pt_builder *builder);

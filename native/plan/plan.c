@@ -719,6 +719,7 @@ static void plan_points(struct pt_builder *builder)
     if (plan->layers == 1)
         put_together(builder);
     pt_plan_assess(builder);
+    pt_plan_reveal(builder);
     pt_add_passes_step(builder, PT_STEP_PASSES);
 }
 

@@ -61,6 +61,9 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(CELL_PLACE, f32x4, CELLS, ONE, 0)                                                                                        \
     X(CELL_MERGED, f32x4, CELLS, ONE, 0)                                                                                       \
     X(CELL_INCLINED, f32x4, CELLS, ONE, 0)                                                                                     \
+    X(CELL_LEAST, f32, CELLS, ONE, 0)                                                                                          \
+    X(CELL_MOST, f32, CELLS, ONE, 0)                                                                                           \
+    X(APART, f32, WINDOW, ONE, 0)                                                                                              \
     X(COMBINED, f32x4, CROP, ONE, 0)                                                                                           \
     X(DEPTH, f32, CROP, ONE, 0)                                                                                                \
     X(NORMALS, f32x3, CROP, ONE, 0)                                                                                            \
@@ -73,6 +76,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(CERTAINTY, f32, CROP, ONE, 0)                                                                                            \
     X(THICKNESS, f32, CROP, ONE, 0)                                                                                            \
     X(DENSITY, f32, CROP, ONE, 0)                                                                                              \
+    X(DISAGREEMENT, f32, CROP, ONE, 0)                                                                                         \
     X(LAYER_COMBINED, f32x4, CROP, LAYERS, 0)                                                                                  \
     X(LAYER_DEPTH, f32, CROP, LAYERS, 0)                                                                                       \
     X(LAYER_NORMALS, f32x3, CROP, LAYERS, 0)
@@ -307,7 +311,7 @@ struct pt_plan {
     float line_radius; // of the widest line, pixels; 0: none
     uint32_t reopens;  // how often points are drawn where closed pixels are taken back: 2; 0: none are
     uint32_t
-        assessed; // of PATINA_PASS_CERTAINTY, _THICKNESS, _DENSITY, bits 1 << those that are asked for and known of something
+        assessed; // of PATINA_PASS_CERTAINTY, _THICKNESS, _DENSITY, _DISAGREEMENT, bits 1 << those that are asked for and known of something
     struct pt_arena *arena;
 };
 

@@ -120,8 +120,34 @@ static void add_cells(struct pt_builder *builder, uint32_t i, const struct pt_ra
               "means of points up to gamma %.3g behind the nearest", (double)range->gamma);
 }
 
+// Whether the picture is to tell how far scans lie apart, and the instance knows its own.
+static int differs(const struct pt_builder *builder, const struct pt_plan_instance *instance)
+{
+    return builder->layer <= 1 && !builder->behind && !builder->plan->map &&
+           builder->scene->settings.passes >> PATINA_PASS_DISAGREEMENT & 1u && instance->instance->style.scans;
+}
+
+static void add_differences(struct pt_builder *builder, uint32_t i, const struct pt_range *range, struct pt_ref chunks)
+{
+    const struct pt_plan *plan = builder->plan;
+    const struct patina_scans *scans = plan->instances[i].instance->style.scans;
+    struct differ_args args = {.view = range->cells,
+                               .gamma = range->gamma,
+                               .gamma_cells = range->gamma_cells,
+                               .sifted = plan->drawn_words > 0,
+                               .start = 1};
+    for (; args.first < PT_DIFFER_MOST && args.first <= scans->greatest; args.first += PT_DIFFER_SCANS, args.start = 0)
+        PT_REASON(
+            PT_ADD(builder, differ, args,
+                   {pt_plane_at(PT_PLANE_CELLS, 0), pt_plane_at(PT_PLANE_CELL_INCLINED, 0), pt_plane_at(PT_PLANE_CELL_LEAST, 0),
+                    pt_plane_at(PT_PLANE_CELL_MOST, 0), chunks, pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i),
+                    pt_buffer_of(PT_SCANS, i), plan->drawn_words ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()}),
+            "how far scans of instance %u lie apart: %u to %u", i, args.first, args.first + PT_DIFFER_SCANS - 1);
+}
+
 // pass: PT_RANGE_*.
-static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_range *range, uint32_t pass, int behind)
+static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_range *range, struct pt_ref chunks, uint32_t pass,
+                      int behind)
 {
     static const char *const told[] = {"", ", marked where they are not sharp", ", where those before were not sharp"};
     const struct pt_plan *plan = builder->plan;
@@ -129,6 +155,9 @@ static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_ra
     const struct incline_args incline = {.view = range->cells, .gamma = range->gamma, .gamma_cells = range->gamma_cells};
     PT_REASON(PT_ADD(builder, incline, incline, {pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_INCLINED, 0)}),
               "normals of instance %u's cells, from those around", i);
+    const int apart = differs(builder, instance);
+    if (apart)
+        add_differences(builder, i, range, chunks);
     const struct magnify_args magnify = {.view = pt_view_of(plan, instance, 0),
                                          .cells = range->cells,
                                          .gamma = range->gamma,
@@ -142,25 +171,53 @@ static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_ra
                                          .id_base = instance->args.id_base,
                                          .id_count = instance->args.id_count,
                                          .most = CROWDED * range->points,
-                                         .cosine = GRAZED};
+                                         .cosine = GRAZED,
+                                         .with_apart = (uint32_t)apart};
     PT_REASON(PT_ADD(builder, magnify, magnify,
                      {pt_plane_at(PT_PLANE_CELLS, 0), pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_MERGED, 0),
                       pt_plane_at(PT_PLANE_CELL_INCLINED, 0), pt_keys_of(builder, 0), pt_from_of(builder, 0),
                       pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_ALBEDO, 0),
                       pt_plane_at(PT_PLANE_AWAY, 0), pt_plane_if(plan->sigmas, PT_PLANE_SPAN, 0),
-                      pt_plane_if(behind, PT_PLANE_LIMIT, 0)}),
+                      pt_plane_if(behind, PT_PLANE_LIMIT, 0), pt_plane_if(apart, PT_PLANE_CELL_LEAST, 0),
+                      pt_plane_if(apart, PT_PLANE_CELL_MOST, 0), pt_plane_if(apart, PT_PLANE_APART, 0)}),
               "faces between instance %u's cells%s%s", i, told[pass], behind ? ", behind what is drawn already" : "");
 }
 
 static void add_range(struct pt_builder *builder, uint32_t i, int behind)
 {
     const struct pt_range *range = builder->plan->instances[i].range;
-    add_cells(builder, i, range, pt_buffer_of(PT_CHUNKS, i), behind);
-    add_faces(builder, i, range, range->fine ? PT_RANGE_COARSE : PT_RANGE_ALONE, behind);
+    const struct pt_ref chunks = pt_buffer_of(PT_CHUNKS, i), fine = pt_buffer_of(PT_FINE_CHUNKS, i);
+    add_cells(builder, i, range, chunks, behind);
+    add_faces(builder, i, range, chunks, range->fine ? PT_RANGE_COARSE : PT_RANGE_ALONE, behind);
     if (!range->fine)
         return;
-    add_cells(builder, i, range->fine, pt_buffer_of(PT_FINE_CHUNKS, i), behind);
-    add_faces(builder, i, range->fine, PT_RANGE_FINE, behind);
+    add_cells(builder, i, range->fine, fine, behind);
+    add_faces(builder, i, range->fine, fine, PT_RANGE_FINE, behind);
+}
+
+void pt_plan_reveal(struct pt_builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    struct reveal_args args = {
+        .view = plan->view, .crop_x = plan->crop[0], .crop_y = plan->crop[1], .crop_width = plan->crop[2], .first = 1};
+    args.view.rect[0] = plan->crop[0];
+    args.view.rect[1] = plan->crop[1];
+    args.view.rect[2] = plan->crop[0] + plan->crop[2];
+    args.view.rect[3] = plan->crop[1] + plan->crop[3];
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        const struct pt_plan_instance *instance = &plan->instances[i];
+        if (!instance->range || !instance->chunk_count || !differs(builder, instance))
+            continue;
+        args.instance = instance->args;
+        PT_REASON(PT_ADD(builder, reveal, args,
+                         {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_FROM, 0), pt_plane_at(PT_PLANE_APART, 0),
+                          pt_plane_at(PT_PLANE_DISAGREEMENT, 0)}),
+                  "how far scans of instance %u lie apart is asked for", i);
+        args.first = 0;
+        plan->assessed |= 1u << PATINA_PASS_DISAGREEMENT;
+    }
+    if (args.first)
+        pt_skip(builder, "reveal", "no pass asks how far scans lie apart, or no cloud in view knows its scans");
 }
 
 void pt_plan_ranges(struct pt_builder *builder)
@@ -171,6 +228,11 @@ void pt_plan_ranges(struct pt_builder *builder)
         for (int k = 0; k < 4; k++)
             pt_skip(builder, names[k], "no cloud in view is drawn as range images");
     }
+    int apart = 0;
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        apart |= plan->instances[i].range && plan->instances[i].chunk_count && differs(builder, &plan->instances[i]);
+    if (!apart)
+        pt_skip(builder, "differ", "no pass asks how far scans lie apart, or no cloud in view knows its scans");
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].range && plan->instances[i].chunk_count)
             add_range(builder, i, builder->layer > 1 || builder->behind);

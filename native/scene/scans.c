@@ -111,6 +111,7 @@ static void take_points(struct patina_scans *out, const struct patina_cloud *clo
         }
         out->chunks[c][0] = least;
         out->chunks[c][1] = most;
+        out->greatest = most > out->greatest ? most : out->greatest;
     }
 }
 

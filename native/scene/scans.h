@@ -14,7 +14,8 @@ struct patina_scans {
     uint16_t (*chunks)[2]; // least and greatest of each
     patina_scan *scans;    // directions unit, or 0
     uint32_t count;
-    double interval; // the greatest that is known of those with points; 0: none is
+    uint16_t greatest; // of those that points are of
+    double interval;   // the greatest that is known of those with points; 0: none is
 };
 
 // Scans of an instance of range images whose direction is at too great an angle to that of the view, to the middle of its box, as

@@ -54,7 +54,12 @@ static int shows(uint32_t pass, float value, float depth)
     return pass == PATINA_PASS_DENSITY ? value > 0.0f : isfinite(depth);
 }
 
-// Shares go from 0 to 1; others from the least to the greatest but a hundredth of the pixels, thickness and density from 0.
+static int from_zero(uint32_t pass)
+{
+    return pass == PATINA_PASS_THICKNESS || pass == PATINA_PASS_DENSITY || pass == PATINA_PASS_DISAGREEMENT;
+}
+
+// Shares go from 0 to 1; others from the least to the greatest but a hundredth of the pixels, some from 0.
 static int find_range(uint32_t pass, const float *values, const float *depth, size_t count, double range[2])
 {
     range[0] = 0.0;
@@ -70,7 +75,7 @@ static int find_range(uint32_t pass, const float *values, const float *depth, si
             sorted[known++] = fabsf(values[i]);
     qsort(sorted, known, sizeof *sorted, compare_floats);
     if (known) {
-        range[0] = pass == PATINA_PASS_THICKNESS || pass == PATINA_PASS_DENSITY ? 0.0 : (double)sorted[known / 100];
+        range[0] = from_zero(pass) ? 0.0 : (double)sorted[known / 100];
         range[1] = (double)sorted[known - 1 - known / 100];
     }
     free(sorted);

@@ -153,7 +153,9 @@ static int load_clouds(struct job *job)
         struct tool_stations stations = {0};
         code = tool_load_cloud(options->files[i], &options->color, job->progress, &job->clouds[i], &stations, &job->scans[i]);
         if (!code)
-            code = analyse(job, job->clouds[i], &stations);
+            code = analyse(job, job->clouds[i], options->files[i], &stations);
+        if (!code && options->pass == PATINA_PASS_DISAGREEMENT && !job->scans[i].made)
+            code = tool_make_scans(&stations, options->files[i], job->clouds[i], &job->scans[i].made);
         tool_free_stations(&stations);
         if (!code)
             code = patina_cloud_get_info(job->clouds[i], &info);

@@ -123,12 +123,28 @@ void tool_describe_stations(const struct tool_stations *stations, patina_analysi
     desc->column = (patina_array){.data = stations->column, .type = PATINA_INT32, .components = 1};
 }
 
+void tool_use_grid(const struct tool_stations *stations, const char *path, patina_analysis_desc *desc)
+{
+    desc->grid = stations->row && stations->column && (stations->count || stations->direction_count);
+    if (!desc->grid)
+        tool_say("%s: no scan has a grid and tells from where it was taken: neighbours in space tell all", path);
+}
+
+int tool_make_scans(const struct tool_stations *stations, const char *path, const patina_cloud *cloud, patina_scans **out)
+{
+    const patina_scan unknown = {.interval = 0};
+    if (stations->station)
+        return patina_scans_create(cloud, stations->station, &unknown, 1, out);
+    tool_say("%s: which scan each point is of is not known", path);
+    return PATINA_OK;
+}
+
 void tool_free_stations(struct tool_stations *stations)
 {
     free(stations->places);
+    free(stations->directions);
     free(stations->station);
     free(stations->row);
     free(stations->column);
     *stations = (struct tool_stations){0};
 }
-    free(stations->directions);

@@ -150,6 +150,10 @@ struct tool_scans {
 int tool_take_scans(const patina_file *file, const patina_cloud *cloud, struct tool_scans *out); // a patina_error
 // Into the description of an analysis, which needs them until it is done.
 void tool_describe_stations(const struct tool_stations *stations, patina_analysis_desc *desc);
+// Its grids tell what every point knows, or a line of standard error says that there are none.
+void tool_use_grid(const struct tool_stations *stations, const char *path, patina_analysis_desc *desc);
+// Which of its scans each point is of; or a line of standard error says that this is not known. A patina_error.
+int tool_make_scans(const struct tool_stations *stations, const char *path, const patina_cloud *cloud, patina_scans **out);
 void tool_free_stations(struct tool_stations *stations);
 
 extern const char *const tool_kinds[6]; // patina_kind

@@ -18,6 +18,9 @@ layout(std430, binding = BIND_away) buffer away_block { float away_from[]; };
 layout(std430, binding = BIND_span) writeonly buffer span_block { float span[]; };
 layout(std430, binding = BIND_limit) readonly buffer limit_block { float limit[]; };
 
+layout(std430, binding = BIND_most) readonly buffer most_block { float most_of[]; };
+layout(std430, binding = BIND_apart) writeonly buffer apart_block { float apart_of[]; };
+
 // Cells that may be corners of a face over a pixel: 3 x 3, row by row.
 vec2 corner[9]; // from the pixel's centre, in cells
 float depth[9], factor[9]; // 1 / z, or 1 in orthographic views
@@ -223,4 +226,8 @@ void main()
     away_from[at] = away;
     if (args.with_span != 0u)
         span[at] = distance;
+    if (args.with_apart != 0u) {
+        precise float apart = most_of[cell_of[which]] - read_float(cell_of[which]);
+        apart_of[at] = pt_max(apart, 0.0);
+    }
 }

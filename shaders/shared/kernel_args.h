@@ -367,6 +367,8 @@ struct blend_args {
 #define PT_RANGE_ALONE 0u  // passes of magnify: the only one
 #define PT_RANGE_COARSE 1u // the first of two
 #define PT_RANGE_FINE 2u   // the second, of finer cells
+#define PT_DIFFER_SCANS 4u  // at a time
+#define PT_DIFFER_MOST 1024u // scans beyond share these numbers
 #define PT_RANGE_LEAST 1e-30f // of gamma, and the most
 #define PT_RANGE_MOST 1e30f
 
@@ -387,6 +389,18 @@ struct merge_args {
     struct instance_args instance;
     float gamma, gamma_cells;
     uint32_t sifted; // as in scatter_args
+};
+
+// differ: how far scans lie apart: of each cell the means, scan by scan, of how far those points lie off its plane that merge takes. The
+// plane goes through the middle of the cell where its nearest point is in depth, and has the cell's normal, so that a slope within a cell
+// is no difference. PT_DIFFER_SCANS scans a pass; least and most hold what those before found, PT_RANGE_MOST and its negative: nothing.
+// Sums are integers, of the share off / min(gamma, PT_RANGE_DEEPEST footprint), from -1 to 1, PT_SUM_SCALE a unit.
+struct differ_args {
+    struct view_args view; // of the cells
+    float gamma, gamma_cells;
+    uint32_t sifted; // as in scatter_args
+    uint32_t first;  // scan % PT_DIFFER_MOST of those that this pass counts: from here on
+    uint32_t start;  // 1: least and most hold nothing yet
 };
 
 // incline: a cell's normal: the sum of those of the 24 triangles [K Fig. 4] of which it is a corner and two of the cells around are the
@@ -416,6 +430,7 @@ struct magnify_args {
     uint32_t id_base, id_count; // of the instance
     float most;         // of two: cells of more points are not sharp
     float cosine;       // nor are those that are seen at less of it
+    uint32_t with_apart; // 1: the apart plane takes max(most - least, 0) of the corner that weighs most: differ
 };
 
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Its radius is d /
@@ -825,6 +840,14 @@ struct assess_args {
     uint32_t first;                // 1: pixels that the instance does not show become 0; else they stay
     uint32_t certainty, thickness; // either may be left out
     float sigma_scale;             // times instance.spacing of its class: a thickness
+};
+
+// reveal: what the apart plane says of the instance's pixels, or of the pixel whose surface they show; 0 elsewhere.
+struct reveal_args {
+    struct view_args view;
+    struct instance_args instance;
+    uint32_t crop_x, crop_y, crop_width;
+    uint32_t first; // as in assess_args
 };
 
 #define PT_SIGHT_BEND 1.25f // a tangent u lies at (1.25 - 0.25 u^2) u on its face: cells are 0.75 to 1 of a face's mean angle wide

@@ -10,7 +10,7 @@ enum { UNTOUCHED = -77 };
 struct setup {
     struct magnify_args args;
     uint64_t *cells, *keys;
-    float *places, *merged, *inclined, *limit, *away;
+    float *places, *merged, *inclined, *limit, *away, *least, *most;
 };
 
 static struct setup make(struct harness *h, struct rng *rng, uint32_t width, uint32_t height, int perspective, float pixel,
@@ -36,6 +36,8 @@ static struct setup make(struct harness *h, struct rng *rng, uint32_t width, uin
     s.cells = harness_alloc(h, count * 8);
     s.merged = harness_alloc(h, count * 16);
     s.inclined = harness_alloc(h, count * 16);
+    s.least = harness_alloc(h, count * 4);
+    s.most = harness_alloc(h, count * 4);
     s.keys = harness_alloc(h, pixels * 8);
     s.limit = harness_alloc(h, pixels * 4);
     s.away = harness_alloc(h, pixels * 4);
@@ -47,6 +49,8 @@ static struct setup make(struct harness *h, struct rng *rng, uint32_t width, uin
         s.cells[i] = s.places[4 * i + 3] > 0.0f ? ref_key(s.places[4 * i + 2], 500 + (uint32_t)i) : REF_EMPTY_KEY;
         for (int k = 0; k < 4; k++)
             s.merged[4 * i + (size_t)k] = s.places[4 * i + 3] > 0.0f ? (float)rng_unit(rng) : NAN;
+        s.least[i] = rng_below(rng, 5) ? (float)rng_range(rng, -0.01, 0.01) : PT_RANGE_MOST;
+        s.most[i] = s.least[i] < PT_RANGE_MOST ? s.least[i] + (float)rng_range(rng, 0.0, 0.02) : -PT_RANGE_MOST;
         float n[3];
         rng_direction(rng, n);
         n[2] = fabsf(n[2]) + 1.0f;
@@ -66,7 +70,7 @@ static struct setup make(struct harness *h, struct rng *rng, uint32_t width, uin
 struct shown {
     const uint64_t *keys;
     const uint32_t *from;
-    const float *normal, *deff, *albedo, *away, *span;
+    const float *normal, *deff, *albedo, *away, *span, *apart;
 };
 
 // As the first of two passes left it: own pixels near the cells' depths, some marked.
@@ -121,7 +125,8 @@ static void compare(struct harness *h, const struct setup *s, const struct shown
         return;
     if (!shown) {
         if (got->keys[at] != s->keys[at] || got->deff[at] != UNTOUCHED || got->normal[4 * at] != UNTOUCHED ||
-            got->albedo[4 * at] != UNTOUCHED || got->away[at] != (marked ? -1.0f - s->away[at] : s->away[at]))
+            got->albedo[4 * at] != UNTOUCHED || (got->apart && got->apart[at] != UNTOUCHED) ||
+            got->away[at] != (marked ? -1.0f - s->away[at] : s->away[at]))
             harness_fail(h, "keys", x, y, "was written");
         return;
     }
@@ -134,6 +139,9 @@ static void compare(struct harness *h, const struct setup *s, const struct shown
     if (expected.marked == REF_YES ? !harness_near(-1.0 - got->away[at], expected.away, expected.away_error + 1e-5)
                                    : !harness_near(got->away[at], expected.away, expected.away_error))
         harness_fail(h, "away", x, y, "got %.9g, expected %.9g +- %.2g", got->away[at], expected.away, expected.away_error);
+    const float apart = fmaxf(s->most[expected.cell] - s->least[expected.cell], 0.0f);
+    if (got->apart && got->apart[at] != apart)
+        harness_fail(h, "apart", x, y, "got %.9g, expected %.9g", got->apart[at], apart);
     for (int k = 0; k < 3; k++)
         if (!harness_near(got->normal[4 * at + (size_t)k], n[k], expected.normal_error))
             harness_fail(h, "normal", x, y, "axis %d: got %.9g, expected %.9g +- %.2g", k, got->normal[4 * at + (size_t)k],
@@ -159,19 +167,26 @@ static struct shown run(struct harness *h, const struct setup *s, double open)
     struct pt_buffer *albedo = harness_buffer(h, unset, pixels * 16), *away = harness_buffer(h, s->away, pixels * 4);
     struct pt_buffer *span = s->args.with_span ? harness_buffer(h, unset, pixels * 4) : NULL;
     struct pt_buffer *limit = s->args.behind ? harness_buffer(h, s->limit, pixels * 4) : NULL;
-    HARNESS_RUN(h, magnify, &s->args, cells, place, merged, inclined, keys, from, normal, deff, albedo, away, span, limit);
+    struct pt_buffer *least = s->args.with_apart ? harness_buffer(h, s->least, count * 4) : NULL;
+    struct pt_buffer *most = s->args.with_apart ? harness_buffer(h, s->most, count * 4) : NULL;
+    struct pt_buffer *apart = s->args.with_apart ? harness_buffer(h, unset, pixels * 4) : NULL;
+    HARNESS_RUN(h, magnify, &s->args, cells, place, merged, inclined, keys, from, normal, deff, albedo, away, span, limit,
+                least, most, apart);
     struct shown got = {.keys = harness_read(h, keys),
                         .from = harness_read(h, from),
                         .normal = harness_read(h, normal),
                         .deff = harness_read(h, deff),
                         .albedo = harness_read(h, albedo),
                         .away = harness_read(h, away),
-                        .span = span ? harness_read(h, span) : NULL};
+                        .span = span ? harness_read(h, span) : NULL,
+                        .apart = apart ? harness_read(h, apart) : NULL};
     harness_same(h, "keys", got.keys, pixels, 8, 1, view->width);
     harness_same(h, "normal", got.normal, pixels * 4, 4, 4, view->width);
     harness_same(h, "deff", got.deff, pixels, 4, 1, view->width);
     harness_same(h, "albedo", got.albedo, pixels * 4, 4, 4, view->width);
     harness_same(h, "away", got.away, pixels, 4, 1, view->width);
+    if (apart)
+        harness_same(h, "apart", got.apart, pixels, 4, 1, view->width);
     if (span)
         HARNESS_CHECK(h, !memcmp(got.span, got.deff, pixels * 4));
     for (uint32_t y = view->rect[1]; y < view->rect[3]; y++)
@@ -194,6 +209,7 @@ static void pictures(struct harness *h)
                 setup.args.gamma_cells = gammas[(p + s) % 3][1];
                 setup.args.behind = (p + (uint32_t)kind) % 2;
                 setup.args.with_span = s == 0;
+                setup.args.with_apart = s != 1;
                 if ((p + (size_t)kind + s) % 3 == 1)
                     setup.args.pass = PT_RANGE_COARSE;
                 if ((p + (size_t)kind + s) % 3 == 2)

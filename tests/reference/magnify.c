@@ -217,6 +217,7 @@ static void set_shown(const struct around *a, const struct face *face, const uin
     const struct corner *c = &a->corners[face->k[most]];
     const double error = fmin(64.0 * face->z_error / fmax(face->z, 1e-30), 1.0) + 2e-5, length = ref_length(n);
     const struct ref_ray ray = ref_ray(view, x, y);
+    out->cell = c->cell;
     out->id = ref_key_id(cells[c->cell]);
     if (a->args->pass == PT_RANGE_COARSE && out->marked != REF_YES)
         out->marked = unsharp(a, places + 4 * c->cell, inclined + 4 * c->cell, ray);

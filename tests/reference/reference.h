@@ -387,6 +387,18 @@ struct ref_merge {
 // A cell whose key is at `nearest`, of the point with this id.
 struct ref_merge ref_merge(const struct merge_args *args, const struct ref_merged_point *points, uint32_t count, float nearest,
                            uint32_t id, int x, int y);
+struct ref_differ {
+    double least, most, error; // PT_RANGE_MOST and its negative: no point of these scans
+    int unsure;
+};
+// As ref_merge; scans: of the points; inclined: of the cell.
+struct ref_differ ref_differ(const struct differ_args *args, const struct ref_merged_point *points, const uint16_t *scans,
+                             uint32_t count, float nearest, uint32_t id, const float *inclined, int x, int y);
+struct ref_reveal {
+    double apart;
+    int written; // 0: the pixel stays as it is
+};
+struct ref_reveal ref_reveal(const struct reveal_args *args, const struct ref_planes *planes, const float *apart, int x, int y);
 struct ref_incline {
     struct ref_vec n;
     double error;
@@ -397,6 +409,7 @@ struct ref_magnify {
     int shown, unsure;     // shown: something is, keys aside
     enum ref_truth marked; // of the first of two passes: not sharp
     uint32_t id;
+    size_t cell; // of the corner that weighs most
     double z, z_error, color[4], color_error, normal_error, deff, deff_error, away, away_error;
     struct ref_vec n;
 };

@@ -274,6 +274,12 @@ static void show(const struct walk *walk, uint32_t x, uint32_t y, const struct c
     vf_store_where((float *)PT_DATA(walk->call, magnify, away) + at, away, some);
     if (args->with_span)
         vf_store_where((float *)PT_DATA(walk->call, magnify, span) + at, distance, some);
+    if (args->with_apart) {
+        const vi cell = pick_cell(c, which);
+        const vf apart = vf_gather(PT_DATA(walk->call, magnify, most), cell, some) -
+                         vf_gather(PT_DATA(walk->call, magnify, least), cell, some);
+        vf_store_where((float *)PT_DATA(walk->call, magnify, apart) + at, vf_max(apart, zero), some);
+    }
 }
 
 static void magnify_row(void *context, uint32_t y)

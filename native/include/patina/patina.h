@@ -697,7 +697,8 @@ PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimu
     X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")                                   \
     X(CERTAINTY, 1, "0..1, of the nearest point's kind, as analysed; 0 where nothing is known, or nothing is")                 \
     X(THICKNESS, 1, "sigma of the nearest point's surface, world units; 0 where nothing is known, or nothing is")              \
-    X(DENSITY, 1, "soft points before the surface, for each square of the world's unit across the pixel's ray; 0 without any")
+    X(DENSITY, 1, "soft points before the surface, for each square of the world's unit across the pixel's ray; 0 without any") \
+    X(DISAGREEMENT, 1, "of range images: how far apart the scans lie there along the normal, world units; 0: only one is there")
 
 enum patina_pass {
 #define PATINA_X(name, channels, text) PATINA_PASS_##name,

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Points of a chunk in the cells of an image buffer, in whole numbers: band of rows by band, so that a band's sums stay in the cache, and
+// nobody else adds to them. Of merge and differ; twin of shaders/lib/cells.glsl
+#ifndef PT_CELLS_H
+#define PT_CELLS_H
+
+#include "device_cpu/kernels/ranges.h"
+#include "device_cpu/kernels/shade.h"
+#include "device_cpu/kernels/sums.h"
+
+enum {
+    PT_CELL_BLOCK = 256,     // points
+    PT_BAND_CELLS = 1 << 13, // about
+    PT_BAND_LEAST = 8,
+    PT_BAND_MOST = 64, // rows
+};
+
+typedef int64_t pt_vl_eight __attribute__((vector_size(64), aligned(8), may_alias));
+
+struct pt_cell_band {
+    uint32_t first, end; // rows of the plane
+    int64_t *sums;       // PT_SUMS a cell
+};
+
+struct pt_cell_block { // of a chunk: its points in view that do not face away and fall into the band, packed
+    uint32_t count;
+    uint32_t cell[PT_CELL_BLOCK + PT_LANES], id[PT_CELL_BLOCK + PT_LANES]; // cell: in the plane
+    // x, y: cells from the picture's corner
+    float x[PT_CELL_BLOCK + PT_LANES], y[PT_CELL_BLOCK + PT_LANES], z[PT_CELL_BLOCK + PT_LANES];
+};
+
+struct pt_cells {
+    const struct pt_cpu_call *call;
+    const struct view_args *view;
+    const float *positions;
+    const uint32_t *surface, *drawn; // drawn NULL: nothing is sifted
+    const struct chunk_view *chunks;
+    uint32_t chunk_count;
+    // A block goes into its band's sums; means of PT_LANES cells from the one at `at` on, `count` of which there are, come out of them.
+    void (*add)(const struct pt_cells *cells, const struct pt_cell_band *band, const struct pt_cell_block *block);
+    void (*save)(const struct pt_cells *cells, const struct pt_cell_band *band, size_t at, uint32_t count);
+    uint32_t rows; // of a band
+    char *memory;  // per thread
+    size_t thread_bytes;
+};
+
+// Where points [first, last) lie.
+static inline void pt_cells_project(const struct pt_cells *cells, const struct pt_cell_band *band,
+                                    const struct chunk_view *chunk, uint32_t first, uint32_t last, struct pt_cell_block *block)
+{
+    const struct view_args *view = cells->view;
+    const float *positions = cells->positions + 3 * (size_t)chunk->first;
+    const uint32_t *surface = cells->surface + chunk->first, *drawn = cells->drawn;
+    const vf left = vf_set((float)view->origin_x), right = vf_set((float)(view->origin_x + (int32_t)view->width));
+    const vf low = vf_set((float)(view->origin_y + (int32_t)band->first)),
+             high = vf_set((float)(view->origin_y + (int32_t)band->end));
+    uint32_t count = 0;
+    for (uint32_t i = first; i < last; i += PT_LANES) {
+        const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                         vf_load(positions + 2 * (size_t)chunk->padded + i)};
+        const vf z = vf_transform(chunk, 2, p[0], p[1], p[2]);
+        vf x = vf_transform(chunk, 0, p[0], p[1], p[2]), y = vf_transform(chunk, 1, p[0], p[1], p[2]);
+        if (view->perspective) {
+            const vf r = vf_rcp(z);
+            x = x * r;
+            y = y * r;
+        }
+        vm some = vm_and(vm_and(vf_le(vf_set(view->z_near), z), vf_le(z, vf_set(view->z_far))),
+                         vm_and(vm_and(vf_le(left, x), vf_lt(x, right)), vm_and(vf_le(low, y), vf_lt(y, high))));
+        some = vm_and(some, vm_first(pt_lanes_left(i, last)));
+        if (chunk->sifted)
+            some = vm_and(some, vm_of_bits(drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
+        if (!vm_bits(some))
+            continue;
+        if (chunk->cull)
+            some = vm_and(some, vm_not(pt_faces_away(chunk, vi_load(surface + i), p)));
+        const vf column = vf_floor(x), row = vf_floor(y);
+        const vi at = vi_add(vi_mul(vi_sub(vf_int(row), vi_set((uint32_t)view->origin_y)), vi_set(view->width)),
+                             vi_sub(vf_int(column), vi_set((uint32_t)view->origin_x)));
+        const uint32_t lanes = vm_bits(some);
+        vi_pack(block->cell + count, at, lanes);
+        vi_pack(block->id + count, vi_add(vi_set(chunk->first + i), vi_lanes()), lanes);
+        vi_pack((uint32_t *)(void *)(block->x + count), vf_bits(x), lanes);
+        vi_pack((uint32_t *)(void *)(block->y + count), vf_bits(y), lanes);
+        vi_pack((uint32_t *)(void *)(block->z + count), vi_and(vf_bits(z), vi_set(0x7FFFFFFFu)), lanes);
+        count += (uint32_t)__builtin_popcount(lanes);
+    }
+    block->count = count;
+}
+
+// What depths of a cell's points are told in parts of.
+static inline vf pt_cell_reach(const struct view_args *view, vf gamma, vf z)
+{
+    return vf_min(gamma, vf_max(vf_set(PT_RANGE_DEEPEST) * vf_footprint(view, z), vf_set(PT_RANGE_LEAST)));
+}
+
+static inline int pt_cells_may_reach(const struct view_args *view, const struct chunk_view *chunk,
+                                     const struct pt_cell_band *band)
+{
+    const uint32_t end = chunk->row_end ? chunk->row_end : view->height;
+    return chunk->row_first < band->end && band->first < end;
+}
+
+static void pt_cells_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct pt_cells *cells = context;
+    const struct view_args *view = cells->view;
+    const uint32_t *rect = view->rect;
+    struct pt_cell_block block;
+    struct pt_cell_band band = {.sums = (int64_t *)(void *)(cells->memory + thread * cells->thread_bytes)};
+    for (uint32_t b = begin; b < end && !pt_cpu_cancelled(cells->call); b++) {
+        band.first = rect[1] + b * cells->rows;
+        band.end = band.first + cells->rows < rect[3] ? band.first + cells->rows : rect[3];
+        memset(band.sums, 0, (size_t)(band.end - band.first) * view->width * PT_SUMS * sizeof *band.sums);
+        for (uint32_t c = 0; c < cells->chunk_count; c++) {
+            const struct chunk_view *chunk = &cells->chunks[c];
+            for (uint32_t first = 0; pt_cells_may_reach(view, chunk, &band) && first < chunk->count; first += PT_CELL_BLOCK) {
+                pt_cells_project(cells, &band, chunk, first,
+                                 chunk->count - first < PT_CELL_BLOCK ? chunk->count : first + PT_CELL_BLOCK, &block);
+                cells->add(cells, &band, &block);
+            }
+        }
+        for (uint32_t y = band.first; y < band.end; y++)
+            for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES)
+                cells->save(cells, &band, (size_t)y * view->width + x, pt_lanes_left(x, rect[2]));
+    }
+}
+
+static int pt_cells_run(struct pt_cells *cells)
+{
+    const struct view_args *view = cells->view;
+    if (view->rect[0] >= view->rect[2] || view->rect[1] >= view->rect[3])
+        return PATINA_OK;
+    const uint32_t fit = PT_BAND_CELLS / view->width;
+    cells->rows = fit < PT_BAND_LEAST ? PT_BAND_LEAST : fit < PT_BAND_MOST ? fit : PT_BAND_MOST;
+    cells->thread_bytes = ((size_t)cells->rows * view->width * PT_SUMS * sizeof(int64_t) + 63) / 64 * 64;
+    cells->memory = pt_cpu_scratch(cells->call, 0, pt_pool_threads(cells->call->pool) * cells->thread_bytes);
+    if (!cells->memory)
+        return PATINA_ERROR_MEMORY;
+    pt_parallel(cells->call->pool, (view->rect[3] - view->rect[1] + cells->rows - 1) / cells->rows, 1, pt_cells_bands, cells);
+    return pt_cpu_cancelled(cells->call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
+}
+
+#endif
