@@ -196,7 +196,7 @@ int tool_load_cloud(const char *path, const struct tool_color *color, patina_pro
         code = take_scalars(file, color->attribute, *out);
     if (!code)
         code = tool_take_stations(file, stations);
-    if (!code)
+    if (!code && scans)
         code = tool_take_scans(file, *out, scans);
     patina_file_destroy(file);
     return code;
