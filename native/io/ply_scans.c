@@ -51,11 +51,8 @@ static bool read_line(const uint8_t *at, const uint8_t *end, struct pt_scan *sca
     if (!is_size(values[0]) || !is_size(values[1]) || !(values[2] >= 0) || !(square == 0 || fabs(square - 1) < 1e-3) ||
         !pt_turns(values + 9, 4))
         return false;
-    *scan = (struct pt_scan){.columns = (uint32_t)values[0],
-                             .rows = (uint32_t)values[1],
-                             .interval = values[2],
-                             .nowhere = !there,
-                             .told = true};
+    *scan = (struct pt_scan){
+        .columns = (uint32_t)values[0], .rows = (uint32_t)values[1], .interval = values[2], .nowhere = !there, .told = true};
     memcpy(scan->direction, values + 3, sizeof scan->direction);
     memcpy(scan->station, values + PLACE, sizeof scan->station);
     memcpy(scan->pose, values + 9, sizeof scan->pose);

@@ -222,7 +222,7 @@ def ranges(found: dict[str, Any] | None, path: Path, title: str) -> bool:
         axis.set(xscale="log", xlabel="the processor's ms a frame, without analysis", ylabel=label)
         axis.grid(True, which="both", alpha=0.2)
     axes[0].legend(fontsize=8)
-    figure.suptitle(f"Nine scans of a torus, 512 x 512: {title}", fontsize=10)
+    figure.suptitle(f"Eighteen scans of a torus, 512 x 512: {title}", fontsize=10)
     figure.tight_layout()
     figure.savefig(path, dpi=110)
     plt.close(figure)
