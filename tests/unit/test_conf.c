@@ -163,6 +163,41 @@ static void test_bad_scans(void **state)
     assert_int_equal(patina_file_open_memory("bmesh a 0 0 0 0 0 0 1\n", 22, &file), PATINA_ERROR_FORMAT);
 }
 
+// A scan whose grid lies keeps its points and says what is wrong, by its file's name; the scan beside it is as it was.
+static void test_bad_grids(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *columns, *cells, *words;
+        int has_grid;
+    } bad[] = {
+        {"4", "1 0\n1 1\n0\n0\n1 2\n0\n", "bad.ply: the range_grid of 6 cells is left out: num_cols and num_rows say 4 x 2", 0},
+        {"99999999999", "1 0\n1 1\n0\n0\n1 2\n0\n", "bad.ply: the range_grid of 6 cells is left out", 0},
+        {"3", "1 0\n1 7\n0\n0\n1 2\n1 -1\n", "bad.ply: 2 cells of the range_grid name points that are not there, and 0 one", 1},
+        {"3", "1 0\n1 0\n1 0\n0\n1 2\n0\n", "bad.ply: 0 cells of the range_grid name points that are not there, and 2 one that another cell has", 1},
+    };
+    put_grid("one.ply", 2, "");
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        char text[1024];
+        snprintf(text, sizeof text,
+                 ASCII "obj_info num_cols %s\nobj_info num_rows 2\nelement vertex 3\n" XYZ
+                       "element range_grid 6\nproperty list uchar int vertex_indices\nend_header\n0 0 1\n0.1 0 1\n0.2 0.1 1\n%s",
+                 bad[i].columns, bad[i].cells);
+        put("bad.ply", text);
+        patina_file *file = open_conf("bmesh bad.ply 0 0 0 0 0 0 1\nbmesh one.ply 5 0 0 0 0 0 1\n");
+        patina_file_scan scan = {.struct_size = sizeof scan};
+        assert_true(info_of(file).count == 9 && info_of(file).scans == 2);
+        expect_place(file, 2, 0.2, 0.1, 1);
+        expect_place(file, 3, 5, 0, 2);
+        assert_int_equal(patina_file_get_scan(file, 0, &scan), PATINA_OK);
+        assert_true(scan.count == 3 && (scan.columns != 0) == bad[i].has_grid);
+        assert_int_equal(patina_file_get_scan(file, 1, &scan), PATINA_OK);
+        assert_true(scan.count == 6 && scan.columns == 3 && scan.rows == 2 && fabs(scan.interval - 0.1) < 1e-6);
+        expect_log(bad[i].words);
+        patina_file_destroy(file);
+    }
+}
+
 // A quaternion that is not of length 1 turns all the same, and one point is a scan; both are told.
 static void test_odd_scans(void **state)
 {
@@ -236,7 +271,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_places),     cmocka_unit_test(test_bad_scans), cmocka_unit_test(test_odd_scans),
+        cmocka_unit_test(test_places),     cmocka_unit_test(test_bad_scans),
+        cmocka_unit_test(test_bad_grids), cmocka_unit_test(test_odd_scans),
         cmocka_unit_test(test_ptx_within), cmocka_unit_test(test_cancel),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
