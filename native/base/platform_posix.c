@@ -133,13 +133,14 @@ double pt_milliseconds(void)
 
 // ---- memory ------------------------------------------------------------------------------------------------------------
 
-#if defined(__aarch64__)
-enum { PAGE = 1 << 16, HUGE_PAGE = 2 << 20 }; // the largest that its systems have
-#else
-enum { PAGE = 4096, HUGE_PAGE = 2 << 20 };
-#endif
+enum { HUGE_PAGE = 2 << 20 };
 
-static size_t whole_pages(size_t size) { return size ? (size + PAGE - 1) / PAGE * PAGE : PAGE; }
+// As the system has them: 4, 16 or 64 KiB on ARM. Rounded up any further, what is given back of a mapped file would be its neighbours'.
+static size_t whole_pages(size_t size)
+{
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE);
+    return size ? (size + page - 1) / page * page : page;
+}
 
 // Whole huge pages inside are asked for as such; what is left over at the end stays small, so that none is wasted.
 void *pt_pages_alloc(size_t size)

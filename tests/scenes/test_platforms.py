@@ -44,6 +44,8 @@ PICTURES = {
     "soft points, Express": "bare --soft express --soft-radius 0.1",
     "soft points, Concentric": "bare --soft concentric --soft-radius 0.1 --soft-shells 8",
     "certainty": "bare --pass certainty",
+    "range images": "bare --surface ranges --lit",
+    "range images in two passes": "full --surface ranges --lit --range-sharpness 0.7",
 }
 
 

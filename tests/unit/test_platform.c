@@ -220,6 +220,32 @@ static void test_disk(void **state)
     pt_pages_free(mapped, 10);
 }
 
+// What is given back of a mapped file is no page of those beside it, however large the system's pages are.
+static void test_map_among_pages(void **state)
+{
+    (void)state;
+    enum { COUNT = 8, SIZE = 70000 };
+    struct pt_disk disk;
+    unsigned char *pages[COUNT];
+    void *maps[COUNT];
+    write_text(at("small"), "0123456789");
+    assert_int_equal(pt_disk_open(at("small"), &disk), 0);
+    for (int i = 0; i < COUNT; i++) {
+        assert_int_equal(pt_disk_map(&disk, 0, 10, i % 2 ? PT_DISK_ANYWHERE : PT_DISK_ONCE, &maps[i]), 0);
+        pages[i] = pt_pages_alloc(SIZE);
+        assert_non_null(pages[i]);
+        memset(pages[i], i + 1, SIZE);
+    }
+    pt_disk_close(&disk);
+    for (int i = 0; i < COUNT; i++)
+        pt_pages_free(maps[i], 10);
+    for (int i = 0; i < COUNT; i++) {
+        for (int k = 0; k < SIZE; k++)
+            assert_int_equal(pages[i][k], i + 1);
+        pt_pages_free(pages[i], SIZE);
+    }
+}
+
 static void test_large_stream(void **state)
 {
     (void)state;
@@ -379,10 +405,10 @@ static void test_library(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_threads), cmocka_unit_test(test_machine),      cmocka_unit_test(test_pages),
-        cmocka_unit_test(test_disk),    cmocka_unit_test(test_large_stream), cmocka_unit_test(test_whole),
-        cmocka_unit_test(test_decimal), cmocka_unit_test(test_library),      cmocka_unit_test(test_mapped),
-        cmocka_unit_test(test_paths),
+        cmocka_unit_test(test_threads), cmocka_unit_test(test_machine),         cmocka_unit_test(test_pages),
+        cmocka_unit_test(test_disk),    cmocka_unit_test(test_map_among_pages), cmocka_unit_test(test_large_stream),
+        cmocka_unit_test(test_whole),   cmocka_unit_test(test_decimal),         cmocka_unit_test(test_library),
+        cmocka_unit_test(test_mapped),  cmocka_unit_test(test_paths),
 #ifdef _WIN32
         cmocka_unit_test(test_held),
 #endif
