@@ -18,7 +18,8 @@ Some groups are of --full, --readme and --only alone: meshes (as triangles again
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
 scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
 (ten minutes of work in Blender), analysis (what every point knows, 10 million), walk (frame by frame
-through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs). With --quick they take a million points, and one
+through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs), platforms (Blender's start with
+the add-on, sizes of packages, instructions of NEON's inner loops). With --quick they take a million points, and one
 minute. Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor)
 and scaling (threads up to all cores).
 """
@@ -38,6 +39,7 @@ from typing import Any
 import analysis
 import case as cases
 import imports
+import instructions
 import machine
 import meshes
 import page
@@ -51,6 +53,7 @@ import report
 import scans
 import soft
 import stage
+import start
 import walk
 import window
 
@@ -222,6 +225,9 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
                  lambda options: analysis.times(1_000_000 if options.quick else 10_000_000, options.library)),
     "normals": ("analysis", "Normals of known shapes", lambda options: analysis.normals(options.library)),
     "walk": ("walk", "Walks through virtual scans", lambda options: walk.text(options.quick, options.library)),
+    "start": ("platforms", "Blender's start, and the packages", lambda options: start.measure(3 if options.quick else 9)),
+    "instructions": ("platforms", "Instructions of inner loops, NEON's against AVX2's",
+                     lambda options: instructions.table(options.library.parent, ROOT / "build/out/linux-arm64")),
     "session": ("session", "A long session", lambda options: quoted.session(1 if options.quick else 10, options.library)),
 }
 
