@@ -82,6 +82,8 @@ def tile(scene: bpy.types.Scene, number: str, columns: str, rows: str, path: str
     render.border_min_y, render.border_max_y = (bottom + 0.25) / height, (top + 0.25) / height
     render.use_compositing = render.use_sequencer = False  # these look at the whole
     settings = render.image_settings
+    if hasattr(settings, "media_type"):  # from 5.0 on
+        settings.media_type = 'IMAGE'
     settings.file_format, settings.color_mode, settings.color_depth, settings.exr_codec = 'OPEN_EXR', 'RGBA', '32', 'ZIP'
     render_to(scene, Path(path))
     found = read(Path(path)).shape[:2]

@@ -20,6 +20,11 @@ HERE = Path(__file__).resolve().parent
 COPIED = ("task.py", "slurm.py", "patina.js", "in_blender.py")
 
 
+ABOUT = """Every machine needs this folder, and the files that job.json names, by the same paths, Python 3.8 or newer, and the same version of the program:
+the one that job.json names, or the one that PATINA_PROGRAM (PATINA_BLENDER) names there. Any task may be run again: python3 task.py tells how.
+"""
+
+
 class Wrong(Exception):
     pass
 
@@ -84,6 +89,8 @@ def write(folder: Path, job: dict) -> None:
         beside = folder / f"{name}.part"
         beside.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         os.replace(beside, folder / name)
+    lines = [f"{farm}:\n    {command}\n" for farm, command in commands_of(folder).items()]
+    (folder / "README.txt").write_text(f"A job of Patina: {job['name']}, {job['kind']}\n\n{''.join(lines)}\n{ABOUT}", encoding="utf-8")
 
 
 def commands_of(folder: Path) -> dict:

@@ -10,6 +10,7 @@ from . import (
     colors,
     combine,
     export_points,
+    farm,
     import_points,
     linked_points,
     plan,
@@ -28,7 +29,7 @@ from . import (
     world,
 )
 
-_MODULES = (analyze, balance, clips, colors, import_points, export_points, combine, linked_points, plan, points, points_keys, points_tools, preferences,
+_MODULES = (analyze, balance, clips, colors, import_points, export_points, combine, farm, linked_points, plan, points, points_keys, points_tools, preferences,
             scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
 
 

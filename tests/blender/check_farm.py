@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Send to Farm: the folder that it writes, and that its tasks draw what F12 draws, in Blenders of their own."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+from harness import REPOSITORY, SCRATCH, Skip, add_points, check, new_scene
+from patina.farm import task
+
+
+def pixels_of(path):
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name = 'Non-Color'
+    flat = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(flat)
+    bpy.data.images.remove(image)
+    return flat
+
+
+def scene_of_points():
+    scene = new_scene()
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 61, 47, 100
+    scene.render.image_settings.file_format, scene.render.image_settings.color_mode = 'PNG', 'RGBA'
+    scene.render.dither_intensity = 0.0  # grain is of the whole picture
+    scene.frame_start, scene.frame_end, scene.frame_step = 1, 3, 2
+    draw = np.random.default_rng(4)
+    points = draw.uniform(-1, 1, (4000, 3))
+    obj = add_points(points, draw.integers(30, 255, (4000, 4), dtype=np.uint8))
+    for frame, angle in ((1, 0.0), (3, 0.7)):
+        obj.rotation_euler[2] = angle
+        obj.keyframe_insert("rotation_euler", frame=frame)
+    return scene
+
+
+def farm_blender():
+    """A Blender that starts with the add-on of this tree, as a farm's would with one installed."""
+    program = bpy.app.binary_path or ""
+    if not program:
+        raise Skip("this Blender is a module: a farm's is a program")
+    package = SCRATCH / "farm" / "patina"
+    if not package.exists():
+        package.parent.mkdir(exist_ok=True)
+        package.symlink_to(REPOSITORY / "addon", target_is_directory=True)
+    script = SCRATCH / "farm" / "blender"
+    script.write_text(f'#!/bin/sh\n[ "$1" = --version ] && exec "{program}" --version\nexec "{program}" --factory-startup "$@"\n', encoding="utf-8")
+    script.chmod(0o755)
+    return dict(os.environ, PATINA_BLENDER=str(script), PATINA_ADDON=str(package), PYTHONDONTWRITEBYTECODE="1")
+
+
+def run_task(folder, *arguments, env, code=0):
+    # Debian's Blender finds its modules by the first python3 of the path: the one that it was built for
+    python = "/usr/bin/python3" if Path("/usr/bin/python3").exists() else shutil.which("python3") or sys.executable
+    done = subprocess.run([python, folder / "task.py", *map(str, arguments)], env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          check=False)
+    check(done.returncode == code, f"{arguments}: {done.returncode}: {done.stdout[-1500:]}")
+    return done.stdout
+
+
+def refused(part, **options):
+    try:
+        bpy.ops.render.patina_farm(directory=str(SCRATCH / "no-farm"), **options)
+    except RuntimeError as error:
+        check(part in str(error), str(error))
+    else:
+        check(False, f"no refusal: {part}")
+    check(not (SCRATCH / "no-farm").exists(), "a folder was written")
+
+
+def test_farm_draws_frames():
+    env = farm_blender()
+    scene = scene_of_points()
+    scene.render.filepath = str(SCRATCH / "film" / "f_##")
+    folder = SCRATCH / "film-farm"
+    bpy.ops.render.patina_farm(directory=str(folder), kind='FRAMES')
+    job = json.loads((folder / "job.json").read_text("utf-8"))
+    check(job["frames"] == [1, 3] and job["by"] == "blender" and job["version"] == f"Blender {bpy.app.version_string}", f"{job}")
+    check(all((folder / name).is_file() for name in ("slurm.py", "template.json", "patina.js", "README.txt", "scene.blend")), "files are missing")
+    run_task(folder, "check", env=env)
+    for frame in (1, 3):
+        run_task(folder, "frame", frame, env=env)
+        scene.frame_set(frame)
+        scene.render.filepath = str(SCRATCH / f"whole{frame}.png")
+        bpy.ops.render.render(write_still=True)
+        check(np.array_equal(pixels_of(SCRATCH / "film" / f"f_{frame:02d}.png"), pixels_of(SCRATCH / f"whole{frame}.png")), f"frame {frame} differs")
+    check(not np.array_equal(pixels_of(SCRATCH / "whole1.png"), pixels_of(SCRATCH / "whole3.png")), "nothing moves")
+    check("has no frame 2" in run_task(folder, "frame", 2, env=env, code=1), "frame 2")
+    job["addon"] = [9, 9, 9]
+    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+    check("made with Patina 9.9.9" in run_task(folder, "frame", 1, env=env, code=1), "another version of the add-on")
+
+
+def test_farm_draws_tiles():
+    env = farm_blender()
+    scene = scene_of_points()
+    scene.frame_set(3)
+    scene.render.filepath = str(SCRATCH / "still.png")
+    folder = SCRATCH / "still-farm"
+    bpy.ops.render.patina_farm(directory=str(folder), kind='TILES', columns=3, rows=1)
+    for tile in (1, 2):
+        run_task(folder, "tile", tile, env=env)
+    check("tile 3 of 3 x 1 has not run" in run_task(folder, "merge", env=env, code=1), "tile 3 is not named")
+    run_task(folder, "tile", 3, env=env)
+    run_task(folder, "merge", env=env)
+    scene.render.filepath = str(SCRATCH / "whole.png")
+    bpy.ops.render.render(write_still=True)
+    merged, whole = pixels_of(SCRATCH / "still.png"), pixels_of(SCRATCH / "whole.png")
+    check(merged.shape == whole.shape and np.array_equal(merged, whole), f"{np.abs(merged - whole).max() * 255:.1f} of 255 off")
+    check(whole.reshape(-1, 4)[:, 3].min() < whole.reshape(-1, 4)[:, :3].max(), "nothing to be seen")
+
+
+def test_farm_refuses():
+    scene = scene_of_points()
+    scene.render.filepath = str(SCRATCH / "x.png")
+    scene.render.use_border = True
+    refused("Render Region", kind='TILES')
+    scene.render.use_border = False
+    scene.patina.noise = 0.01
+    refused("noise threshold", kind='TILES')
+    scene.patina.noise = 0.0
+    refused("too small", kind='TILES', columns=40, rows=40)
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = 'MULTI_LAYER_IMAGE'
+    settings.file_format = 'OPEN_EXR_MULTILAYER'
+    refused("multilayer", kind='TILES', columns=2, rows=2)
+    if hasattr(settings, "media_type"):
+        settings.media_type = 'IMAGE'
+    settings.file_format = 'PNG'
+    image = bpy.data.images.new("gone", 4, 4)
+    image.source, image.filepath = 'FILE', str(SCRATCH / "gone.png")
+    refused("gone.png cannot be read")
+    bpy.data.images.remove(image)
+    scene.camera = None
+    refused("no camera")
+
+
+def test_farm_tasks_are_named():
+    """Where frames go, by the name that Blender's output has."""
+    for given, expected in (("a##.png", "a07.png"), ("a.png", "a0007.png"), ("b_######.exr", "b_000007.exr")):
+        found = task.frame_path({"directory": "/x", "output": given}, 7)
+        check(found.name == expected, f"{given}: {found}")
