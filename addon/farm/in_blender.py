@@ -129,7 +129,7 @@ def merge(scene: bpy.types.Scene, columns: str, rows: str, path: str, *tiles: st
 
 def main() -> None:
     job = json.loads((FOLDER / "job.json").read_text("utf-8"))
-    kind, *arguments = sys.argv[sys.argv.index("--") + 1:]
+    kind, *arguments = [word for word in sys.argv[sys.argv.index("--") + 1:] if not word.startswith("--patina-")]
     enable(job["addon"])
     scene = bpy.data.scenes.get(job["scene"])
     if scene is None:

@@ -137,7 +137,8 @@ def finished_path() -> Path:
 
 
 def in_blender(job: dict, *arguments: object) -> None:
-    run(job, "-b", FOLDER / "scene.blend", "--python-exit-code", WRONG, "--python", FOLDER / "in_blender.py", "--", *arguments)
+    run(job, "-b", FOLDER / "scene.blend", "--python-exit-code", WRONG, "--python", FOLDER / "in_blender.py", "--", *arguments,
+        "--patina-strict")  # a picture that lacks a cloud is none
 
 
 def convert(job: dict, number: int) -> None:

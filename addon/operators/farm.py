@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy.types import Context, Operator, Scene
 
 from ..engine import PatinaRenderEngine
 from ..farm import job, task
-from ..sync import files, sequence
+from ..sync import files, linked, sequence
 
 MOVIES = {'FFMPEG', 'AVI_JPEG', 'AVI_RAW'}
 PLAIN = {'R_LAYERS', 'COMPOSITE', 'GROUP_OUTPUT', 'GROUP_INPUT', 'VIEWER'}  # nodes that change no pixel
@@ -33,11 +33,13 @@ class PATINA_OT_send_to_farm(Operator):
     bl_options = {'REGISTER'}
 
     directory: StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE'}, description="The job's folder, which all machines reach by the same path")
-    filter_folder: bpy.props.BoolProperty(default=True, options={'HIDDEN'})
+    filter_folder: BoolProperty(default=True, options={'HIDDEN'})
     kind: EnumProperty(name="Tasks", items=(('FRAMES', "Frames", "The frames of the animation, one a task", 0),
                                             ('TILES', "Tiles", "The picture of this frame, one tile a task", 1)))
     columns: IntProperty(name="Columns", default=4, min=1, max=256, description="Tiles beside each other")
     rows: IntProperty(name="Rows", default=4, min=1, max=256, description="Tiles above each other")
+    share: BoolProperty(name="Share Built Clouds", default=True,
+                        description="Put what is built of linked scans beside them, in a folder named .patina, so that no machine builds it again")
     command: StringProperty(options={'HIDDEN', 'SKIP_SAVE'}, description="How Slurm is told, once the folder is there")
 
     def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
@@ -53,6 +55,7 @@ class PATINA_OT_send_to_farm(Operator):
         if self.kind == 'TILES':
             self.layout.prop(self, "columns")
             self.layout.prop(self, "rows")
+        self.layout.prop(self, "share")
 
     def execute(self, context: Context) -> set[str]:
         folder = Path(bpy.path.abspath(self.directory)).absolute()
@@ -62,6 +65,8 @@ class PATINA_OT_send_to_farm(Operator):
             bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"), copy=True, relative_remap=True)
             described["files"][str(folder / "scene.blend")] = task.look_of(folder / "scene.blend")
             job.write(folder, described)
+            if self.share:
+                _share(context.scene)
         except (Refused, RuntimeError) as error:
             self.report({'ERROR'}, f"Patina: {error}")
             return {'CANCELLED'}
@@ -142,6 +147,13 @@ def _files() -> dict[str, list]:
         except OSError as error:
             raise Refused(f"{place} cannot be read: {error.strerror}") from error
     return found
+
+
+def _share(scene: Scene) -> None:
+    for obj in scene.objects:
+        source = linked.source_of(obj, scene.frame_current, []) if obj.patina.linked_file else None
+        if source is not None:
+            linked.share(source)
 
 
 def _menu(self: bpy.types.Menu, context: Context) -> None:

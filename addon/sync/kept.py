@@ -43,6 +43,20 @@ def folder() -> Path:
     return beside
 
 
+def beside(path: Path) -> Path:
+    """Where clouds are kept that many machines share: a folder beside the scan. Nothing goes there but by Send to Farm."""
+    return path.parent / ".patina"
+
+
+def place_of(path: Path, name: str) -> Path:
+    """Of a scan's kept cloud: one's own, else one that lies beside the scan."""
+    own, shared = folder() / name, beside(path) / name
+    with contextlib.suppress(OSError):
+        if not own.is_file() and shared.is_file():
+            return shared
+    return own
+
+
 def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], list[float], dict[str, Any] | None, str]:
     """Origin, scanners, units, scans and what is told of these, of a kept cloud. ValueError or OSError where they are not there as they were written."""
     notes = json.loads(path.read_text("utf-8"))

@@ -6,9 +6,11 @@ A cloud is built at the first time, analyzed, and saved in Blender's folder of u
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
+import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -100,7 +102,7 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
     place = _hash(f"{path.resolve()}{origin or ''}", 12)
     state = _hash(f"{status.st_size} {status.st_mtime_ns}", 6)
     variant = _hash(f"{scalar} {analyzed} {hide_uncolored}", 4)  # several objects may link one file
-    return Source(path, kept.folder() / f"{place}-{state}-{variant}.cloud", origin, scalar, analyzed, hide_uncolored, pattern)
+    return Source(path, kept.place_of(path, f"{place}-{state}-{variant}.cloud"), origin, scalar, analyzed, hide_uncolored, pattern)
 
 
 def before(found: Source) -> Source | None:
@@ -122,6 +124,26 @@ def loss(name: str, source: Source, error: Exception, shown: Source | None = Non
     return Loss(importers.told(f"{what}: {source.path} cannot be read: {why}"))
 
 
+def share(source: Source) -> bool:
+    """Puts what is kept of a scan beside it, for other machines. Whether it lies there; not where nothing is kept, or the folder may not be written."""
+    target = kept.beside(source.path)
+    names = [source.kept.with_suffix(ending) for ending in (".json", SCAN_ENDING, source.kept.suffix)]  # the cloud last: with it the rest is there
+    if source.kept.parent == target:
+        return True
+    if not source.kept.is_file():
+        return False
+    try:
+        target.mkdir(exist_ok=True)
+        for path in names:
+            part = target / f"{path.name}.{os.getpid()}.part"
+            if path.is_file() and not (target / path.name).is_file():
+                shutil.copyfile(path, part)
+                os.replace(part, target / path.name)
+    except OSError:
+        return False
+    return True
+
+
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
     """Maps the kept cloud, or builds and keeps it. Any thread. PatinaError when the file cannot be read."""
     return jobs.finish(steps(source, progress or importers.Progress()))
@@ -134,7 +156,8 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         found = _linked(native.Cloud.open(source.kept), *kept.read_notes(notes), source.kept)
         if found.scans and found.cloud.scan_file.stat().st_size != 2 * found.cloud.count:
             raise ValueError("which scans the points are of is damaged")
-        os.utime(source.kept)  # used just now
+        with contextlib.suppress(OSError):  # of another user
+            os.utime(source.kept)  # used just now
         kept.CHECKS.start(source.identity(), source.kept)
         return found
     except (native.PatinaError, OSError, ValueError):

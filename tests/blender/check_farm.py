@@ -10,8 +10,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from harness import REPOSITORY, SCRATCH, Skip, add_points, check, new_scene
+from check_import import import_ply
+from check_linked import dense
+from harness import REPOSITORY, SCRATCH, Skip, add_points, check, new_scene, render
+from patina import importers
 from patina.farm import task
+from patina.sync import clouds, linked
 
 
 def pixels_of(path):
@@ -138,6 +142,33 @@ def test_farm_refuses():
     bpy.data.images.remove(image)
     scene.camera = None
     refused("no camera")
+
+
+def test_farm_shares_built_clouds():
+    """A machine whose own folder holds nothing finds what is kept beside the scan, and reads the scan no more."""
+    folder = SCRATCH / "shared"
+    folder.mkdir()
+    new_scene()
+    obj, = import_ply(dense("shared/scan.ply"), link=True)
+    whole = render()["Combined"].copy()
+    own = linked.source_of(obj, 1, []).kept
+    check(own.is_file() and own.parent != folder, f"{own}")
+    bpy.context.scene.render.filepath = str(folder / "x.png")
+    bpy.ops.render.patina_farm(directory=str(folder / "job"), kind='FRAMES')
+    shared = folder / ".patina" / own.name
+    check(shared.read_bytes() == own.read_bytes() and shared.with_suffix(".json").is_file(), "nothing is beside the scan")
+    aside = own.with_suffix(".aside")
+    own.rename(aside)
+    steps, importers.steps = importers.steps, None  # whoever reads the scan fails
+    try:
+        source = linked.source_of(obj, 1, [])
+        check(source.kept == shared, f"{source.kept}")
+        clouds.CACHE.clear()
+        check((render()["Combined"] == whole).all(), "it looks different")
+    finally:
+        importers.steps = steps
+        clouds.CACHE.clear()
+        aside.rename(own)
 
 
 def test_farm_tasks_are_named():
