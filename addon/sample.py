@@ -16,10 +16,22 @@ _OUTLINE = np.array([(0.00, 0.27), (0.05, 0.27), (0.08, 0.20), (0.13, 0.11), (0.
 _BLOCK, _FLOOR = (0.34, 0.40), 1.5  # half width and height of the block, radius of the floor
 
 
+_CLASSES = (5, 6, 2)  # as LAS has them: styles by class show the urn as a plant
+
+
+def classes(count: int) -> np.ndarray:
+    """Of points(count): uint8 (n,)."""
+    return np.repeat(np.array(_CLASSES, np.uint8), [len(part[0]) for part in _parts(count, np.random.default_rng(7))])
+
+
+def _parts(count: int, generator: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    return [_urn(count * 5 // 10, generator), _block(count * 2 // 10, generator), _floor(count * 3 // 10, generator)]
+
+
 def points(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """About so many points: positions and normals float32 (n, 3), colours uint8 sRGB (n, 4)."""
     generator = np.random.default_rng(7)
-    parts = [_urn(count * 5 // 10, generator), _block(count * 2 // 10, generator), _floor(count * 3 // 10, generator)]
+    parts = _parts(count, generator)
     position, normal, color = (np.concatenate(arrays) for arrays in zip(*parts))
     color = np.clip(color * generator.normal(1.0, 0.035, (len(color), 1)), 0, 1)
     bytes_ = np.full((len(color), 4), 255, np.uint8)

@@ -18,7 +18,8 @@
     }
 
 Keys of "scene" are properties of Scene.patina, of "points" those of Object.patina, by their path in Python; those that
-make up a look are listed below, and one that a file leaves out takes its default. Angles are in degrees; colours linear
+make up a look are listed below, and one that a file leaves out takes its default; those of soft points only where the file
+has one of them, or the style before it had: what an artist has painted or chosen there stays. Angles are in degrees; colours linear
 red, green, blue, or "#rrggbb" in sRGB. "view" is left as it is where the file has none. Lights, cameras and worlds are
 never touched, nor is a property that is animated or driven. A picture of the same name, .png, is the file's thumbnail.
 """
@@ -46,6 +47,8 @@ LARGEST = 1 << 20  # bytes of a file
 SCENE = ("smooth", "use_shadows", "shadow_samples", "studio", "effects", "lines")
 POINTS = ("lighting", "opacity", "color", "ambient", "diffuse", "specular", "shininess", "colors.source", "colors.ramp",
           "colors.exposure", "colors.contrast")
+SOFT = tuple(f"soft.{name}" for name in ("use", "by", "attribute", "classes", "shape", "use_range", "range_min", "range_max", "invert",
+                                         "threshold", "transition", "opacity"))
 
 
 class StyleError(Exception):
@@ -219,7 +222,7 @@ def _properties(group: bpy.types.Struct, names: Iterable[str]) -> Iterator[tuple
 
 def _known(section: str) -> dict[str, bpy.types.Property]:
     """What keys of a file's section stand for."""
-    owners = {"scene": (bpy.types.Scene, SCENE), "points": (bpy.types.Object, POINTS)}
+    owners = {"scene": (bpy.types.Scene, SCENE), "points": (bpy.types.Object, POINTS + SOFT)}
     if section not in owners:
         return {}
     kind, names = owners[section]
@@ -311,7 +314,7 @@ def apply(style: Style, scene: bpy.types.Scene, objects: Iterable[bpy.types.Obje
     kept: list[str] = []
     _set(scene, SCENE, style.scene, kept)
     for obj in objects:
-        _set(obj, POINTS, style.points, kept)
+        _set_points(obj, style, kept)
     notices = []
     if style.unknown:
         notices.append(f"unknown keys ignored: {', '.join(style.unknown)}")
@@ -331,7 +334,13 @@ def dress(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
         style = read(entry(scene.patina.style.applied).path)
     except StyleError:
         return
-    _set(obj, POINTS, style.points, [])
+    _set_points(obj, style, [])
+
+
+def _set_points(obj: bpy.types.Object, style: Style, kept: list[str]) -> None:
+    softens = any(path in SOFT for path in style.points)
+    _set(obj, POINTS + SOFT if softens or obj.patina.soft.styled else POINTS, style.points, kept)
+    obj.patina.soft.styled = softens
 
 
 def _set(owner: bpy.types.ID, names: Iterable[str], values: dict[str, Any], kept: list[str]) -> None:
@@ -371,7 +380,8 @@ def _curves(action: bpy.types.Action, slot: Any) -> list[bpy.types.FCurve]:
 
 def taken(label: str, scene: bpy.types.Scene, obj: bpy.types.Object | None) -> Style:
     """The look of a scene and of an object with points, as a style: what differs from the defaults."""
-    return Style(label, scene=_differing(scene.patina, SCENE), points=_differing(obj.patina, POINTS) if obj else {},
+    names = POINTS + SOFT if obj and obj.patina.soft.use else POINTS
+    return Style(label, scene=_differing(scene.patina, SCENE), points=_differing(obj.patina, names) if obj else {},
                  transform=scene.view_settings.view_transform)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from mathutils import Matrix
 
 from . import native, render, sample, sync
+from .sync.soft import soft_of
 
 SIZE = 192  # pixels a side
 SHRINK = 2  # drawn larger by this: lines are as fine as in a large picture
@@ -37,9 +38,13 @@ def of_sample(depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object) -> np.ndarr
     """The sample in the look of the scene and of an object with points. PatinaError."""
     side = SIZE * SHRINK
     view = sync.View(side, side, (0, 0, side, side), _camera())
-    style = replace(sync.style_of(obj.evaluated_get(depsgraph), Matrix()), d_min=0.0)
-    return _draw(sync.describe_items(depsgraph, view, [], [
-        sync.CloudItem(native.Cloud(*sample.points(SAMPLE_POINTS)), style, 0)]))
+    look = obj.evaluated_get(depsgraph)
+    style = replace(sync.style_of(look, Matrix()), d_min=0.0)
+    softened = soft_of(look, Matrix(), depsgraph.scene_eval)
+    if softened and softened.by == 'DISTANCE':  # from where the sample is seen
+        softened = replace(softened, desc=(*softened.desc, ("world_from_shape", view.camera.world_from_camera)), placed=True)
+    cloud = native.Cloud(*sample.points(SAMPLE_POINTS), classes=sample.classes(SAMPLE_POINTS).reshape(-1, 1))
+    return _draw(sync.describe_items(depsgraph, view, [], [sync.CloudItem(cloud, style, 0, soft=softened)]))
 
 
 def _camera(azimuth: float = radians(28), height: float = radians(16), away: float = 4.6) -> sync.Camera:

@@ -19,6 +19,7 @@ from .steps import Stepped
 # attribute → its type, the key of an element's values
 WRITTEN = {NORMAL_NAME: ('FLOAT_VECTOR', "vector"), "spacing": ('FLOAT', "value"), "radius": ('FLOAT', "value"),
            "thickness": ('FLOAT', "value"), "kind": ('INT8', "value"), "certainty": ('FLOAT', "value")}
+SOFT = {name: ('FLOAT', "value") for name in ("soft_radius", "uncertainty", "density")}
 
 NEAREST = 1e-4  # of how far a 3D view reaches, where it begins
 VIEW_SENSOR = 36.0  # mm, half of what the lens of a 3D view shows the longer side of
@@ -39,6 +40,10 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
     by_grid: BoolProperty(
         name="By Scan Grid", default=False,
         description="Neighbors in the rows and columns of each scan, not only those in space")
+    soft: BoolProperty(
+        name="For Soft Points", default=False, options={'SKIP_SAVE'},
+        description="Also what soft points go by: soft_radius, uncertainty (0 to 1) and density (points for each square of the object's "
+                    "unit). All neighbors are looked at once more")
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -86,6 +91,12 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
         found["half_axes"] = np.ascontiguousarray(found["half_axes"][:, 0])
         for name, values in zip(WRITTEN, found.values(), strict=True):
             _write(data, name, values)
+        if self.soft:
+            walked = cloud.neighbourhoods("soft_radius", "uncertainty")
+            with np.errstate(divide='ignore'):
+                walked["density"] = np.where(found["spacing"] > 0.0, found["spacing"] ** -2.0, 0.0).astype(np.float32)
+            for name, values in walked.items():
+                _write(data, name, values)
         data.update() if obj.type == 'MESH' else data.update_tag()
         kinds = ", ".join(f"{number:,} {name.lower()}" for name, number in zip(native.KINDS, cloud.kinds, strict=True) if number)
         self.report({'INFO'}, f"Analyzed {count:,} points: {kinds}")
@@ -94,7 +105,7 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
 
 def _write(data: bpy.types.ID, name: str, values: np.ndarray) -> None:
     """Makes the point attribute, in place of one that is there."""
-    kind, key = WRITTEN[name]
+    kind, key = (WRITTEN | SOFT)[name]
     known = data.attributes.get(name)
     if known and (known.domain != 'POINT' or known.data_type != kind):
         data.attributes.remove(known)

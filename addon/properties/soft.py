@@ -17,6 +17,7 @@ class PatinaSoftProperties(PropertyGroup):
         name="Soft Points", override=_OVERRIDE, default=False,
         description="Points are balls of density that the eye sees into, instead of surface: all of them, or those that a number of theirs "
                     "says. They throw no shadow and take none")
+    styled: BoolProperty(override=_OVERRIDE, default=False, options={'HIDDEN'})  # by a style: the next one undoes it
     by: EnumProperty(
         name="Soft", override=_OVERRIDE, default='ALL',
         description="Which points are soft: those whose number, brought to 0 to 1, is above the threshold",

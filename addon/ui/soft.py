@@ -32,6 +32,8 @@ class PATINA_PT_soft(ColorPanel, Panel):
         layout.prop(group, "by")
         if group.by == 'ATTRIBUTE':
             layout.prop(group, "attribute")
+            if not obj.patina.linked_file:
+                layout.operator("object.patina_analyze", text="Analyze to Attributes").soft = True
             clash = obj.patina.linked_file and obj.patina.colors.source == 'SCALAR' and obj.patina.colors.scalar != group.attribute
             if clash:
                 layout.label(text="A linked file gives one column: the color ramp's", icon='INFO')

@@ -28,6 +28,7 @@ def stage(side=SIDE):
     scene.camera.data.angle = 2 * np.arctan(camera.right)
     points, normals, colors = sample.points(POINTS)
     obj = add_points(points, colors, normals)
+    obj.data.attributes.new("classification", 'INT', 'POINT').data.foreach_set("value", sample.classes(POINTS).astype(np.int32))
     bpy.context.view_layer.objects.active = obj
     set_world((0.2, 0.2, 0.2))
     return scene, obj
