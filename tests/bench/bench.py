@@ -18,8 +18,9 @@ Some groups are of --full, --readme and --only alone: meshes (as triangles again
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
 scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
 (ten minutes of work in Blender), analysis (what every point knows, 10 million), walk (frame by frame
-through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs), platforms (Blender's start with
-the add-on, sizes of packages, instructions of NEON's inner loops). With --quick they take a million points, and one
+through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs), soft (soft points in the sizes
+of [S Table 1], and against OSPRay), platforms (Blender's start with the add-on, sizes of packages, instructions of NEON's inner
+loops). With --quick they take a million points, and one
 minute. Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor)
 and scaling (threads up to all cores).
 """
@@ -52,8 +53,10 @@ import readme
 import report
 import scans
 import soft
+import soft_points
 import stage
 import start
+import volumes
 import walk
 import window
 
@@ -63,7 +66,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "scans", "independent", "session", "analysis", "walk", "ranges", "graphics", "scaling")
+          "leaves", "scans", "independent", "session", "analysis", "walk", "ranges", "soft", "graphics", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -228,6 +231,8 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
     "start": ("platforms", "Blender's start, and the packages", lambda options: start.measure(3 if options.quick else 9)),
     "instructions": ("platforms", "Instructions of inner loops, NEON's against AVX2's",
                      lambda options: instructions.table(options.library.parent, ROOT / "build/out/linux-arm64")),
+    "soft points": ("soft", "[S Table 1]: frames a second on a GTX 1080 → ours", lambda options: soft_points.text(options.quick, options.library)),
+    "volumes": ("soft", "Soft points and OSPRay's particle volume", lambda options: volumes.text(options.quick, options.library)),
     "session": ("session", "A long session", lambda options: quoted.session(1 if options.quick else 10, options.library)),
 }
 
