@@ -11,8 +11,8 @@ WIDE, DEEP, HIGH = 14.0, 9.0, 6.0
 SHARES = (0.25, 0.3, 0.45)  # of the points: lawn, house, trees
 
 
-def grove(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions (n, 3) float32, colors (n, 3) uint8 sRGB, classes (n,) uint8, in no order."""
+def grove(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Positions and normals (n, 3) float32, colors (n, 3) uint8 sRGB, classes (n,) uint8, in no order. Leaves point anywhere."""
     random = np.random.default_rng(seed)
     lawn, house = int(SHARES[0] * count), int(SHARES[1] * count)
     parts = [_lawn(lawn, random), _house(house, random), _trees(count - lawn - house, random)]
@@ -20,7 +20,10 @@ def grove(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray
     position = np.concatenate([part[0] for part in parts])[order].astype(np.float32)
     color = np.concatenate([part[1] for part in parts])[order] * random.normal(1.0, 0.06, (count, 1))
     classes = np.repeat(np.uint8([2, 6, 5]), [len(part[0]) for part in parts])[order]
-    return position, np.clip(color * 255.0, 0, 255).astype(np.uint8), classes
+    normal = np.concatenate([np.tile((0.0, 0.0, 1.0), (lawn, 1)), np.tile((0.0, -1.0, 0.0), (house, 1)),
+                             random.normal(size=(count - lawn - house, 3))])[order]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return position, normal.astype(np.float32), np.clip(color * 255.0, 0, 255).astype(np.uint8), classes
 
 
 def _lawn(count: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

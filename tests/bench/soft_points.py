@@ -58,9 +58,9 @@ def _frames(device: native.Device, cloud: native.Cloud, field: Field | None, mod
 def measure(device: str, millions: list[float], threads: int = 2) -> dict[str, Any]:
     rows = []
     for size in millions:
-        position, color, classes = groves.grove(round(size * 1e6))
-        cloud = native.Cloud(position, None, color, classes=classes.reshape(-1, 1))
-        del position, color, classes
+        position, normal, color, classes = groves.grove(round(size * 1e6))
+        cloud = native.Cloud(position, normal, color, classes=classes.reshape(-1, 1))
+        del position, normal, color, classes
         field = Field(cloud, source=FIELD_SOURCE["CLASSES"], classes=(1 << PLANTS, *[0] * 7))
         opened = native.Device(device, threads)
         row: dict[str, Any] = {"millions": size, "work": {}, "ms": {}, "rms": {}}

@@ -14,7 +14,7 @@ import numpy as np
 from groves import grove
 from PIL import Image, ImageDraw, ImageFont
 
-POINTS = 1_500_000
+POINTS = 600_000
 SHOWN, GAP, LABEL = (380, 285), 6, 22
 PAPER, INK = (250, 250, 248), (40, 40, 40)
 STEPS = ("1  as scanned", "2  strokes of the brush", "3  painted points are soft", "4  opacity 0.03")
@@ -41,8 +41,8 @@ def sheet(rows: list[list[tuple[Path, str]]], target: Path, inset: Path | None =
 
 def main() -> None:
     if sys.argv[1] == "--grove":
-        position, color, classes = grove(POINTS)
-        np.savez(sys.argv[2], position=position, color=color, classes=classes)
+        position, normal, color, classes = grove(POINTS)
+        np.savez(sys.argv[2], position=position, normal=normal, color=color, classes=classes)
         return
     folder, target = Path(sys.argv[1]), Path(sys.argv[2])
     steps = [(folder / f"paint-{k + 1}.png", label) for k, label in enumerate(STEPS)]

@@ -14,7 +14,7 @@ from check_import import import_ply as import_points
 from check_linked import dense
 from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, patina, sphere
 from mathutils import Quaternion
-from patina import pace, viewport
+from patina import histogram, pace, viewport
 from patina.importers import las
 from patina.sync.analyzing import ANALYSES
 from window import area, invoke_import, newer, screenshot, settled, setup, shown, view, window_region
@@ -143,6 +143,37 @@ def test_analyze_is_undone():
         bpy.ops.ed.undo()
     check("certainty" not in bpy.data.objects["looked at"].data.attributes, "undone")
     yield lambda: settled(20000)
+
+
+def test_histogram_follows():
+    """A panel's histogram is painted by a timer, when a view has drawn the points, when the threshold moves and when numbers change."""
+    setup()
+    positions, colors, normals = sphere(5000, 1.0, (0, 0, 0))
+    obj = add_points(positions, colors, normals)
+    numbers = np.linspace(0.0, 0.999, 5000, dtype=np.float32)
+    obj.data.attributes.new("score", 'FLOAT', 'POINT').data.foreach_set("value", numbers)
+    soft = obj.patina.soft
+    soft.use, soft.by, soft.attribute, soft.threshold = True, 'ATTRIBUTE', "score", 0.25
+    obj.update_tag()
+    check(histogram.of(obj) is None, "before a picture")
+
+    def line():
+        """Where the threshold stands in the picture of what is known now; None while that is not painted."""
+        known = histogram.of(obj)
+        if known is None or not histogram.icon(obj, known) or histogram._painted.get(obj.name) != (
+                known.stamp, soft.threshold, soft.transition):
+            return None
+        return int(np.flatnonzero((np.abs(histogram.pixels(obj) - histogram._LINE).max(-1) < 0.01).all(0))[-1])
+
+    yield lambda: line() == 64
+    check(int(histogram.of(obj).counts.sum()) == 5000, "every point")
+    soft.threshold = 0.75
+    yield lambda: line() == 192
+    stamp = histogram.of(obj).stamp
+    obj.data.attributes["score"].data.foreach_set("value", numbers[::-1] * 0.5)
+    obj.data.update()
+    yield lambda: histogram.of(obj).stamp > stamp and line() == 192
+    check(histogram.of(obj).counts[128:].sum() == 0, "numbers that changed")
 
 
 def test_what_changes_is_read():
