@@ -11,7 +11,7 @@ LIST = ROOT / "native/kernels.def"
 BINDINGS = 12  # storage blocks that a shader may have: what OpenGL 4.3 drivers offer at the least, but for its minimum of 8
 TILE_LIST = "tile_list"  # in the last binding, whatever the kernel: see lib/tiles.glsl
 DOMAINS = ("tiles", "rectangle", "crop", "points", "bins", "triangles")
-STAGES = ("points", "surface", "filling", "means", "meshes", "shadows", "lines", "effects", "finish", "picture")
+STAGES = ("points", "ranges", "measured", "filling", "means", "meshes", "shadows", "lines", "effects", "colors", "picture", "balls")
 PLACES = ("window", "own", "finer", "coarser", "crop", "tiles", "cloud", "mesh")
 ACCESS = ("r", "w", "rw")
 

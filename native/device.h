@@ -5,8 +5,8 @@
 #define PT_DEVICE_H
 
 #include "base/error.h"
-#include "kernel_args.h"
 #include "kernels.h"
+#include "shared/view.h"
 
 #include <stdatomic.h>
 

@@ -3,8 +3,6 @@
 #ifndef PT_MATH_H
 #define PT_MATH_H
 
-#include "kernel_args.h"
-
 #include <stdint.h>
 #include <string.h>
 

@@ -5,6 +5,7 @@
 #define PT_VECTOR_MATH_H
 
 #include "simd.h"
+#include "shared/words.h"
 
 // 1 / x for normal x > 0, within 2 ulp: an integer seed (5% off) and three Newton steps.
 static inline vf vf_rcp(vf x)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "base/color.h"
 #include "device_gl.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <stdio.h>

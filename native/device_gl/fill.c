@@ -2,6 +2,7 @@
 // fill's runner: find, decide and apply, then mark and restore, each until nothing changes. Reading the counts back
 // between them is what lets a phase stop early, and keeps lists and dispatches no longer than needed.
 #include "device_gl.h"
+#include "shared/filling.h"
 
 enum {
     ENTRY_GROUP = 64, // as in fill.comp

@@ -2,6 +2,9 @@
 // Running a kernel: its arguments and buffers are bound (bind.c), and it is dispatched once over its domain. Some have runners of
 // their own.
 #include "device_gl.h"
+#include "shared/measured.h"
+#include "shared/picture.h"
+#include "shared/colors.h"
 
 #include <stdio.h>
 

@@ -2,6 +2,9 @@
 // Runners of kernels that pick out a few pixels: a pass over tiles lists them, the costly part walks the list densely.
 // (llvmpipe runs all lanes of a vector when one of them needs it.)
 #include "device_gl.h"
+#include "shared/lines.h"
+#include "shared/colors.h"
+#include "shared/filling.h"
 
 #include <stdio.h>
 #include <string.h>

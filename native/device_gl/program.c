@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_FILES = 16, MAX_NAME = 64, LOG_SIZE = 4096 };
+enum { MAX_FILES = 32, MAX_NAME = 64, LOG_SIZE = 4096 };
 
 struct source {
     char *text;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runs raster: two passes over a mesh's triangles.
 #include "device_gl.h"
+#include "shared/meshes.h"
 
 enum {
     GROUP = 64,     // triangles a workgroup

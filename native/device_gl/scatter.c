@@ -3,6 +3,8 @@
 // passes over all chunks of all instances (or one of 64 bits); splat: the same; blend, average, merge, differ: a pass a band of rows; lit, sift,
 // center, average: one instance.
 #include "device_gl.h"
+#include "shared/measured.h"
+#include "shared/points.h"
 
 #include <stdio.h>
 #include <stdlib.h>

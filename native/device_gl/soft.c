@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of soft points: gather, and soft, whose tiles are drawn in batches as large as their lists fit the bins.
 #include "device_gl.h"
+#include "shared/balls.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The passes of what an analysis knows of the points that a picture shows: certainty and thickness.
 #include "passes.h"
+#include "shared/picture.h"
 
 #include <string.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The passes of means over the points about a surface, in place of the nearest one.
 #include "passes.h"
+#include "shared/means.h"
 
 static int wants_normals(const struct pt_builder *builder, const struct pt_plan_instance *instance)
 {

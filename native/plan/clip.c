@@ -5,6 +5,8 @@
 #include "scene/clip.h"
 #include "scene/mask.h"
 #include "scene/scans.h"
+#include "shared/effects.h"
+#include "shared/points.h"
 
 #include <string.h>
 

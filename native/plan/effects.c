@@ -2,6 +2,8 @@
 // Effects in image space: which of them a picture has, and what their kernels get.
 #include "passes.h"
 #include "base/elementary.h"
+#include "shared/effects.h"
+#include "shared/picture.h"
 
 #include <math.h>
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "lines.h"
+#include "shared/picture.h"
 
 #include <math.h>
 #include <string.h>

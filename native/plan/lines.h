@@ -4,6 +4,7 @@
 #define PT_PLAN_LINES_H
 
 #include "passes.h"
+#include "shared/lines.h"
 
 // Radius of the widest disc in pixels, wherever in the scene; 0: no lines.
 float pt_line_radius(const struct patina_scene *scene);

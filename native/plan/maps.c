@@ -3,6 +3,7 @@
 // faces of them, thousands in a picture: the plan holds their loops (steps.c), and each is made when its round comes, of the scene, the
 // plan and the round's numbers alone.
 #include "passes.h"
+#include "shared/shadows.h"
 
 #include <string.h>
 

@@ -4,6 +4,10 @@
 
 #include "expected.h"
 #include "lines.h"
+#include "shared/filling.h"
+#include "shared/measured.h"
+#include "shared/points.h"
+#include "shared/shadows.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -477,7 +481,7 @@ static void plan_center(struct pt_builder *builder, uint32_t i)
 
 static int is_of_points(enum pt_stage stage)
 {
-    return stage == PT_STAGE_points || stage == PT_STAGE_surface || stage == PT_STAGE_filling;
+    return stage == PT_STAGE_points || stage == PT_STAGE_ranges || stage == PT_STAGE_measured || stage == PT_STAGE_filling;
 }
 
 static int is_planned(const struct pt_plan *plan, enum pt_kernel kernel)
@@ -627,7 +631,7 @@ static int reads_planes(enum pt_kernel kernel) { return kernel == PT_KERNEL_smoo
 
 static int gives_picture(enum pt_kernel kernel) { return kernel == PT_KERNEL_compose || kernel == PT_KERNEL_peel; }
 
-static int runs_with_others(enum pt_kernel kernel) { return pt_kernels[kernel].stage == PT_STAGE_finish || pointwise(kernel); }
+static int runs_with_others(enum pt_kernel kernel) { return pt_kernels[kernel].stage == PT_STAGE_colors || pointwise(kernel); }
 
 // From shading on, passes may run as one where nobody asks for what lies between them; or from behind the last of those that look
 // around in the colours, if smoothing or anti-aliasing follow.

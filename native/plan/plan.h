@@ -9,6 +9,8 @@
 #include "expected.h"
 #include "scene/scene.h"
 #include "steps.h"
+#include "shared/clips.h"
+#include "shared/colors.h"
 
 #include <math.h>
 

@@ -4,6 +4,8 @@
 
 #include "passes.h"
 #include "scene/scans.h"
+#include "shared/points.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 #include <string.h>

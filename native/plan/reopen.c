@@ -2,6 +2,7 @@
 // The passes that take back what was closed where a station looked through: what shows there is drawn a second time behind it, and
 // what closes it once more becomes what was measured. Planned only where a cloud's free space is asked for.
 #include "passes.h"
+#include "shared/filling.h"
 
 #include <math.h>
 #include <string.h>

@@ -3,6 +3,7 @@
 #include "light_points.h"
 #include "passes.h"
 #include "base/elementary.h"
+#include "shared/measured.h"
 
 #include <math.h>
 #include <string.h>

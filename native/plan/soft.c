@@ -9,6 +9,7 @@
 #include "scene/clip.h"
 #include "scene/mask.h"
 #include "scene/soft.h"
+#include "shared/balls.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -2,6 +2,8 @@
 // The passes of discs: visibility, then (with the surfaces known) what the discs on the nearest surface show, and once shadows are known
 // what light arrives at them. SPEC 5, solid.
 #include "passes.h"
+#include "shared/measured.h"
+#include "shared/points.h"
 
 #include <string.h>
 

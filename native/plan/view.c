@@ -13,6 +13,7 @@
 #include "ranges.h"
 #include "scene/clip.h"
 #include "base/elementary.h"
+#include "shared/discs.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -5,6 +5,9 @@
 #include "expected.h"
 #include "lines.h"
 #include "ranges.h"
+#include "shared/filling.h"
+#include "shared/means.h"
+#include "shared/measured.h"
 
 #include <math.h>
 

@@ -9,6 +9,7 @@
 // grid of about the root of the points a pixel, and shifts for the rest; discs the whole grid. Finer pictures are anti-aliased as
 // any other: without that the sphere's 4 x 4 have 42.9 in place of 46.9.
 #include "frame_samples.h"
+#include "shared/lines.h"
 
 #include <math.h>
 

@@ -2,7 +2,7 @@
 #include "key_file.h"
 
 #include "base/version.h"
-#include "kernel_args.h"
+#include "shared/view.h"
 #include "scene/fingerprint.h"
 
 #include <stdlib.h>

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "numbering.h"
 
-#include "kernel_args.h"
-
 #include <stdlib.h>
 
 void pt_numbering_release(struct pt_numbering *numbering)

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "residency.h"
 
-#include "kernel_args.h"
 #include "scene/soft.h"
 
 #include <stdlib.h>

@@ -3,12 +3,12 @@
 #include "beams.h"
 #include "free_space.h"
 #include "grids.h"
-#include "kernel_args.h"
 #include "base/compare.h"
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "orient.h"
 #include "base/progress.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <stdlib.h>

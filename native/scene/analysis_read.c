@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What an analysed cloud knows, back in the caller's order; neighbours themselves, and [S]'s radius and uncertainty from them.
 #include "analysis.h"
-#include "kernel_args.h"
 #include "base/compare.h"
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "base/progress.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <stdlib.h>

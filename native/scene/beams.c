@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "beams.h"
-#include "kernel_args.h"
 #include "base/elementary.h"
 
 #include <math.h>

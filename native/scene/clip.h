@@ -3,8 +3,9 @@
 #ifndef PT_CLIP_H
 #define PT_CLIP_H
 
-#include "kernel_args.h"
 #include "scene.h"
+#include "shared/clips.h"
+#include "shared/words.h"
 
 // A clip with its inverse: q = inverse (world - center). Of planes only the last row counts, in world units.
 struct pt_inverse_clip {

@@ -3,9 +3,10 @@
 #include "cloud.h"
 #include "base/color.h"
 #include "base/descriptor.h"
-#include "kernel_args.h"
 #include "base/platform.h"
 #include "base/progress.h"
+#include "shared/discs.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,10 +3,10 @@
 // about one; scanners turn about the vertical, hence no cell is starved where they look steeply up. A cell holds the nearest
 // of its samples. One grid at a time; every sum and minimum is of integers, so that threads do not show.
 #include "free_space.h"
-#include "kernel_args.h"
 #include "base/platform.h"
 #include "base/progress.h"
 #include "base/elementary.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #include "io/grid.h"
 #include "base/platform.h"
 #include "base/progress.h"
-#include "kernel_args.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -2,7 +2,6 @@
 // Masks: bits in the caller's order become words in chunk order, once, so that a picture only looks them up.
 #include "mask.h"
 
-#include "kernel_args.h"
 #include "base/platform.h"
 
 #include <stdlib.h>

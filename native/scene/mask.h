@@ -4,8 +4,8 @@
 #ifndef PT_MASK_H
 #define PT_MASK_H
 
-#include "kernel_args.h"
 #include "scene.h"
+#include "shared/words.h"
 
 enum pt_masked { PT_MASKED_NONE, PT_MASKED_SOME, PT_MASKED_ALL }; // of a chunk's points: hidden
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Kinds and footprints: from the plane through a point's neighbours to what a picture may close with it.
 #include "neighbourhood.h"
-#include "kernel_args.h"
 #include "base/elementary.h"
+#include "shared/words.h"
 
 #include <math.h>
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Normals in 26 bits: the octahedral map, 8191 steps a side.
 #include "cloud.h"
-#include "kernel_args.h"
 
 #include <math.h>
 

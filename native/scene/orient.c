@@ -4,9 +4,9 @@
 // the grid) neighbours with like normals tell. A sheet that is seen from both sides faces up.
 #include "orient.h"
 #include "analysis.h"
-#include "kernel_args.h"
 #include "base/platform.h"
 #include "base/progress.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <stdlib.h>

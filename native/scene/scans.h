@@ -3,8 +3,8 @@
 #ifndef PT_SCANS_H
 #define PT_SCANS_H
 
-#include "kernel_args.h"
 #include "scene.h"
+#include "shared/words.h"
 
 struct patina_scans {
     struct pt_handle handle;

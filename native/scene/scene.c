@@ -5,7 +5,8 @@
 #include "clip.h"
 #include "mask.h"
 #include "scans.h"
-#include "kernel_args.h"
+#include "shared/balls.h"
+#include "shared/lines.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shape words (kernel_args.h).
+// Shape words (shared/words.h).
 #include "analysis.h"
-#include "kernel_args.h"
 #include "base/elementary.h"
+#include "shared/words.h"
 
 #include <math.h>
 

@@ -3,8 +3,8 @@
 // was looked through, for the beam beside it went on.
 #include "sights.h"
 #include "base/error.h"
-#include "kernel_args.h"
 #include "base/platform.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <stdatomic.h>

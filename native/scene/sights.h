@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a cloud's stations saw, kept for pictures (SPEC 11): how far each looked in every direction, on the six faces of a cube
-// around it. kernel_args.h says how a place is looked up.
+// around it. shared/filling.h says how a place is looked up.
 #ifndef PT_SIGHTS_H
 #define PT_SIGHTS_H
 

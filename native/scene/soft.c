@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "soft.h"
-
-#include "kernel_args.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <string.h>

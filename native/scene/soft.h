@@ -10,7 +10,7 @@
 float pt_soft_radius(const struct patina_cloud *cloud, const struct pt_chunk *chunk, uint32_t slot);
 // What no radius of the chunk is above.
 double pt_soft_reach(const struct patina_cloud *cloud, const struct pt_chunk *chunk);
-// The field's word (kernel_args.h) of a point; radius, 0 and above, is rounded to 1 / 512 of it.
+// The field's word (shared/words.h) of a point; radius, 0 and above, is rounded to 1 / 512 of it.
 uint32_t pt_soft_word(uint32_t step, float radius);
 
 #endif

@@ -3,9 +3,9 @@
 // within the chunk. For k = 6 this is 1 / sqrt(points per area) within 5% on random points and on square grids alike,
 // and a few duplicate points do not fool it. What a cloud makes of its chunks' spacings, and their classes.
 #include "cloud.h"
-#include "kernel_args.h"
 #include "base/compare.h"
 #include "base/elementary.h"
+#include "shared/view.h"
 
 #include <math.h>
 #include <stdlib.h>

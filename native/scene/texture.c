@@ -5,6 +5,7 @@
 #include "base/descriptor.h"
 
 #include "fingerprint.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -4,7 +4,7 @@
 #define PT_TEXTURE_H
 
 #include "cloud.h"
-#include "kernel_args.h"
+#include "shared/meshes.h"
 
 struct patina_texture {
     struct pt_handle handle;

@@ -10,6 +10,7 @@
 //   STEP 0: find;   STEP 1: mix, an edge an invocation;   STEP 2: apply
 //   BEHIND, INKED: as in the arguments, known beforehand: software would read the through and line planes for nothing.
 #version 430 core
+#include "shared/colors.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #if STEP == 0

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // assess: certainty and thickness of the points that pixels show, into the crop; twin of native/device_cpu/kernels/assess.c
 #version 430 core
+#include "shared/picture.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

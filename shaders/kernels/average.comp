@@ -4,6 +4,8 @@
 //
 // Over a band of rows, as many as the sums have room for. STEP 0: points are added up; STEP 1: means.
 #version 430 core
+#include "shared/means.h"
+#include "shared/words.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/srgb.glsl"

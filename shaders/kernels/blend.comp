@@ -5,7 +5,8 @@
 // Over a band of rows, as many as the sums have room for. STEP 0: discs are added up; STEP 1: means. PART: see PT_BLEND_*; of
 // marks there are no means.
 #version 430 core
-#include "shared/kernel_args.h"
+
+#include "shared/measured.h"
 
 #if STEP == 0
 layout(local_size_x = 64) in;

@@ -4,6 +4,7 @@
 //
 // A workgroup takes a chunk. Points are projected anew, as scatter does.
 #version 430 core
+#include "shared/measured.h"
 #include "lib/math.glsl"
 
 layout(local_size_x = 64) in;

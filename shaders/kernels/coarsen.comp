@@ -2,6 +2,7 @@
 // coarsen: an image buffer without points, and what lies behind the layers taken so far, cell by cell; twin of
 // native/device_cpu/kernels/coarsen.c
 #version 430 core
+#include "shared/ranges.h"
 #include "lib/math.glsl"
 
 layout(local_size_x = 32, local_size_y = 8) in;

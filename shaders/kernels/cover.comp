@@ -2,7 +2,8 @@
 // cover: pixels in which a mesh lies in front show it; its normal, layer distance and colour there; twin of
 // native/device_cpu/kernels/cover.c
 #version 430 core
-#include "shared/kernel_args.h"
+
+#include "shared/meshes.h"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 

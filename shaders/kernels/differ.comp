@@ -2,6 +2,7 @@
 // differ: points of an image buffer's cells -> between which depths the means of single scans lie; twin of
 // native/device_cpu/kernels/differ.c
 #version 430 core
+#include "shared/ranges.h"
 #include "lib/math.glsl"
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { differ_args args; };

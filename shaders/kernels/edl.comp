@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // edl: eye-dome lighting; twin of native/device_cpu/kernels/edl.c
 #version 430 core
+#include "shared/effects.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"

@@ -2,6 +2,7 @@
 // extract: the passes beside the colour, into the crop: z, world-space normal, source, shadow (SPEC 2.2: scholars must see what
 // is scan and what is invention); twin of native/device_cpu/kernels/extract.c
 #version 430 core
+#include "shared/colors.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

@@ -10,6 +10,7 @@
 //   STEP 2: apply;   STEP 3: the tiles for the next step;
 //   STEP 4: mark;   STEP 5: restore;   STEP 6: the entries for the next step
 #version 430 core
+#include "shared/filling.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #if STEP == 0

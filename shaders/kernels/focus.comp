@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // focus: depth of field, and over the background, into the crop; twin of native/device_cpu/kernels/focus.c
 #version 430 core
+#include "shared/picture.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

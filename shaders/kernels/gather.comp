@@ -4,6 +4,7 @@
 //
 // A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). COLOR_FORMAT, OPACITY, LIT and DIRECTED are as in shade.comp.
 #version 430 core
+#include "shared/balls.h"
 #include "lib/math.glsl"
 #include "lib/srgb.glsl"
 

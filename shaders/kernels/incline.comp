@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // incline: places of cells -> their normals [K II.C]; twin of native/device_cpu/kernels/incline.c
 #version 430 core
+#include "shared/ranges.h"
 #include "lib/ranges.glsl"
 #include "lib/planes.glsl"
 

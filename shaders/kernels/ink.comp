@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ink: lines get their colour. [X 3.3]; twin of native/device_cpu/kernels/ink.c
 #version 430 core
+#include "shared/picture.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/srgb.glsl"

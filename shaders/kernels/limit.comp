@@ -2,6 +2,7 @@
 // limit: from where on a light's next map of a faint caster sees its points [D 6]; twin of
 // native/device_cpu/kernels/limit.c
 #version 430 core
+#include "shared/shadows.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

@@ -4,6 +4,7 @@
 // STEP 0: steps, and their pixels' own share of a line; STEP 1: discs; STEP 2: lines. There a workgroup takes a tile, and searches it where a disc
 // within reach lies before the tile's farthest pixel.
 #version 430 core
+#include "shared/lines.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

@@ -2,7 +2,9 @@
 // locate: where pixels that show a mesh lie, and which way they face, as points of a cloud; twin of
 // native/device_cpu/kernels/locate.c
 #version 430 core
-#include "shared/kernel_args.h"
+
+#include "shared/meshes.h"
+#include "shared/words.h"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 

@@ -2,6 +2,7 @@
 // magnify: faces between cells -> pixels of the picture that show them [K II.D]; twin of
 // native/device_cpu/kernels/magnify.c
 #version 430 core
+#include "shared/ranges.h"
 #include "lib/ranges.glsl"
 #include "lib/planes.glsl"
 

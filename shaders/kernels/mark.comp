@@ -2,6 +2,7 @@
 // mark: which points the picture shows (SPEC 4: shadows of no others are computed); twin of
 // native/device_cpu/kernels/mark.c
 #version 430 core
+#include "shared/shadows.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"

@@ -2,6 +2,8 @@
 // merge: points of an image buffer's cells -> their mean place, colour and opacity [K II.B]; twin of
 // native/device_cpu/kernels/merge.c
 #version 430 core
+#include "shared/ranges.h"
+#include "shared/words.h"
 #include "lib/math.glsl"
 #include "lib/srgb.glsl"
 

@@ -4,6 +4,7 @@
 // A plane is linear in the picture as 1/z (perspective) or z (orthographic). Least squares over the window's pixels
 // that can belong to the same surface give w = w_p + a dx + b dy + c, hence the plane n . (u, v, -1) = w, hence n.
 #version 430 core
+#include "shared/measured.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
@@ -50,7 +51,7 @@ float step_along(view_args view, int reach, ivec2 p, float z, ivec2 axis)
     return (known_before || known_after) && alike ? (pt_abs(first) < pt_abs(second) ? first : second) : 0.0;
 }
 
-// Radius of a pixel's window: kernel_args.h.
+// Radius of a pixel's window: shared/measured.h.
 int reach_of(view_args view, int radius, float distance_limit, float z)
 {
     precise float wanted = 0.0 - floor(0.0 - distance_limit * pt_rcp(pt_footprint(view, z)));
@@ -58,7 +59,7 @@ int reach_of(view_args view, int radius, float distance_limit, float z)
 }
 
 // 1. Sums over the window, of rows first. Pixel counts and offsets are small integers: exact in float32. Which pixels:
-// kernel_args.h.
+// shared/measured.h.
 window_sums gather(view_args view, int radius, int x, int y, float z, float w, float distance_limit, float slope,
                    vec2 steps)
 {

@@ -2,6 +2,7 @@
 // obscure: ambient obscurance within a view-space radius; twin of native/device_cpu/kernels/obscure.c
 //   STEP 0: every pixel's taps   STEP 1: the mean over 5 x 5 of them, and the colour
 #version 430 core
+#include "shared/effects.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"

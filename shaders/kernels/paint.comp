@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // paint: pixels that show a mesh take its image's colour; twin of native/device_cpu/kernels/paint.c
 #version 430 core
-#include "shared/kernel_args.h"
+
+#include "shared/meshes.h"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 

@@ -2,6 +2,7 @@
 // peel: a finished layer is blended behind those before it, and says what may show behind it. [D 4, 5], SPEC 3; twin of
 // native/device_cpu/kernels/peel.c. A workgroup is a tile.
 #version 430 core
+#include "shared/colors.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

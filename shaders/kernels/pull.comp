@@ -2,6 +2,7 @@
 // pull: 2 x 2 -> 1, the least key: what a scatter at half the resolution gives. SPEC 2.2; twin of
 // native/device_cpu/kernels/pull.c
 #version 430 core
+#include "shared/filling.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

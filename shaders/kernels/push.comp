@@ -4,6 +4,7 @@
 //
 //   STEP 0: find the pixels, a column of a coarse tile an invocation;   STEP 1: what they take
 #version 430 core
+#include "shared/filling.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #if STEP == 0

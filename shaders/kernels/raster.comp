@@ -4,7 +4,8 @@
 // An invocation takes a triangle. Those larger than SMALL pixels are drawn by the whole workgroup afterwards, and by every
 // gl_NumWorkGroups.y-th workgroup a part. Keys are made in two passes as in scatter: PASS 0: least z; PASS 1: least id.
 #version 430 core
-#include "shared/kernel_args.h"
+
+#include "shared/meshes.h"
 
 #define GROUP 64u
 #define SMALL 64

@@ -3,6 +3,7 @@
 //
 // Which cell a place falls into decides pixels: every sum is written in one order, so that all devices agree.
 #version 430 core
+#include "shared/filling.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // reveal: how far scans lie apart where pixels show an instance, into the crop; twin of native/device_cpu/kernels/reveal.c
 #version 430 core
+#include "shared/picture.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

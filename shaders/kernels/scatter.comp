@@ -12,6 +12,7 @@
 #extension GL_ARB_gpu_shader_int64 : require
 #extension GL_NV_shader_atomic_int64 : require
 #endif
+#include "shared/points.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

@@ -8,6 +8,7 @@
 // RECOLOR: by a ramp, exposure, contrast. DIRECTED: ambient light differs by direction.
 // SHADING, ARRIVED: whether these planes are written.
 #version 430 core
+#include "shared/colors.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/srgb.glsl"
@@ -114,7 +115,7 @@ vec4 read_shown(ivec2 size, int x, int y)
     return vec4(tap.xyz, inside ? tap.w : pt_float(PT_KEY_EMPTY_Z));
 }
 
-// Radius of a pixel's window: kernel_args.h.
+// Radius of a pixel's window: shared/colors.h.
 int reach_of(view_args view, float z, float limit)
 {
     precise float spacings = limit * pt_rcp(pt_footprint(view, z));

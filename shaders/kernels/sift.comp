@@ -4,6 +4,7 @@
 //
 // A workgroup takes a chunk, an invocation PT_SLOTS_A_WORD of its points at a time.
 #version 430 core
+#include "shared/points.h"
 #include "lib/math.glsl"
 
 layout(local_size_x = 64) in;

@@ -2,6 +2,7 @@
 // smooth: 3 x 3 low-pass over the neighbours of the same layer. [D 3.4, Table 1]; twin of
 // native/device_cpu/kernels/smooth.c
 #version 430 core
+#include "shared/colors.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/smooth.glsl"

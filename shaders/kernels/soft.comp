@@ -6,6 +6,7 @@
 // No invocation takes more than about 50,000 steps through its loops, since llvmpipe ends them at 65,535: long lists are sorted a
 // round at a time, and drawn in parts, with what pixels have come to in between.
 #version 430 core
+#include "shared/balls.h"
 #include "lib/math.glsl"
 
 #if STEP < 2

@@ -7,7 +7,8 @@
 #extension GL_ARB_gpu_shader_int64 : require
 #extension GL_NV_shader_atomic_int64 : require
 #endif
-#include "shared/kernel_args.h"
+
+#include "shared/points.h"
 
 layout(local_size_x = 64) in;
 

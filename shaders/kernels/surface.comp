@@ -2,6 +2,7 @@
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of native/device_cpu/kernels/surface.c
 //   NORMALS: whether the cloud has normals; SIGMAS: whether it was analysed; SPAN: whether that plane is written
 #version 430 core
+#include "shared/measured.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"

@@ -8,6 +8,8 @@
 #ifndef PT_DISC_GLSL
 #define PT_DISC_GLSL
 
+#include "shared/discs.h"
+#include "shared/words.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

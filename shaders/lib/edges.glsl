@@ -4,6 +4,7 @@
 #ifndef PT_EDGES_GLSL
 #define PT_EDGES_GLSL
 
+#include "shared/colors.h"
 #include "lib/planes.glsl"
 
 const ivec2 cross_offsets[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));

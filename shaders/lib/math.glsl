@@ -4,7 +4,8 @@
 #ifndef PT_MATH_GLSL
 #define PT_MATH_GLSL
 
-#include "shared/kernel_args.h"
+#include "shared/view.h"
+
 
 uint pt_bits(float x) { return floatBitsToUint(x); }
 float pt_float(uint u) { return uintBitsToFloat(u); }

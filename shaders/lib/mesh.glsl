@@ -4,6 +4,7 @@
 #ifndef PT_MESH_GLSL
 #define PT_MESH_GLSL
 
+#include "shared/meshes.h"
 #include "lib/math.glsl"
 
 struct outline {

@@ -4,6 +4,8 @@
 #ifndef PT_PHONG_GLSL
 #define PT_PHONG_GLSL
 
+#include "shared/colors.h"
+
 struct pixel {
     float z;
     vec2 ray;

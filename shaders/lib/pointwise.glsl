@@ -4,6 +4,9 @@
 //   CLIPS, RESULT: whether it has these. A result is a picture of the crop; else the colours are changed in place, and a picture
 //   without keys is the crop.
 #version 430 core
+#include "shared/colors.h" // of the stages that bodies belong to
+#include "shared/effects.h"
+#include "shared/picture.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #if RESULT || !KEYS

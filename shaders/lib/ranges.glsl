@@ -3,6 +3,7 @@
 #ifndef PT_RANGES_GLSL
 #define PT_RANGES_GLSL
 
+#include "shared/ranges.h"
 #include "lib/math.glsl"
 
 // How far behind z a point of the same surface may lie. cells: their view.

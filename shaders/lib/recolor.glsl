@@ -3,6 +3,8 @@
 #ifndef PT_RECOLOR_GLSL
 #define PT_RECOLOR_GLSL
 
+#include "shared/colors.h"
+
 // Where a pixel lies on the ramp.
 float place_on_ramp(view_args view, float eye_z, vec2 ray, float z, float scalar)
 {

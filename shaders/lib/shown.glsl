@@ -3,6 +3,7 @@
 // is filled, and z, +inf where it shows nothing. A tap of the blend is one fetch then, in place of three that wait for each
 // other.
 #version 430 core
+#include "shared/colors.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 

@@ -3,6 +3,7 @@
 #ifndef PT_SMOOTH_GLSL
 #define PT_SMOOTH_GLSL
 
+#include "shared/colors.h"
 #include "lib/planes.glsl"
 
 // What a neighbour gives: its colour, and z; +inf outside the rectangle.

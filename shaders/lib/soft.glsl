@@ -4,6 +4,8 @@
 #ifndef PT_SOFT_GLSL
 #define PT_SOFT_GLSL
 
+#include "shared/balls.h"
+
 struct ray_of {
     float x, y, u, v, n, root; // x, y: pixel's centre
     float from, to;            // along it

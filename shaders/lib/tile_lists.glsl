@@ -2,7 +2,8 @@
 // Makes the lists of tiles that filters walk (lib/tiles.glsl, native/device_gl/tiles.c).
 //   STEP 0: what each tile holds;   STEP 1: the lists; an invocation a tile
 #version 430 core
-#include "shared/kernel_args.h"
+
+#include "shared/view.h"
 
 #define HOLDS_POINTS 1u
 #define HOLDS_NOTHING 2u

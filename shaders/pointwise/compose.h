@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // compose: premultiplied colour over the background.
 
+#include "shared/colors.h"
+
 PT_BODY(compose)
 {
     vm some = vm_or(HERE.some, vm_if(ARGS.everywhere != 0u));

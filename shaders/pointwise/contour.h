@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // contour: lines where a height is a multiple of an interval.
 
+#include "shared/effects.h"
+
 // What lines of this kind cover of the pixel. along: the height; root: 1 / how much it grows a pixel on.
 PT_FUNCTION vf contour_lines(PT_TAKES(contour) vf along, vf root, uint32_t kind)
 {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // fog: colours fade with distance.
 
+#include "shared/effects.h"
+
 PT_BODY(fog)
 {
     precise vf away = HERE.z;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // hatch: strokes where planes cut the surface.
 
+#include "shared/effects.h"
+
 struct hatch_point {
     vf ray[3], place[3]; // (u, v, -1), in orthographic views (0, 0, -1); the point, view space
     vf width[2];         // of the pixel at the point

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // paper: tint and grain over the picture.
 
+#include "shared/picture.h"
+
 PT_FUNCTION vi paper_mix(vi word, int shift) // word ^ word >> shift
 {
     vi other = vi_shr(word, shift);

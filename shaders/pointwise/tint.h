@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // tint: the surface near a cut takes the cut's colour, as sections are drawn.
 
+#include "shared/effects.h"
+
 struct tint_band { // how far pixels lie from a cut, and how it is tinted
     vf d, strength, width, tint[3];
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // toon: bands of light over colours as they are.
 
+#include "shared/effects.h"
+
 PT_FUNCTION vf toon_luminance(vf r, vf g, vf b)
 {
     precise vf sum = (0.2126f * r + 0.7152f * g) + 0.0722f * b;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "discs.h"
+#include "shared/points.h"
 
 #include <math.h>
 #include <stdlib.h>

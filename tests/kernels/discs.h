@@ -4,6 +4,7 @@
 #define PT_DISCS_H
 
 #include "points.h"
+#include "shared/discs.h"
 
 struct disc_scene {
     struct scene points;

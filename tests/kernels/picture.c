@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Random pictures for the filters' tests.
 #include "harness.h"
+#include "shared/filling.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "points.h"
+#include "shared/words.h"
 
 #include <string.h>
 

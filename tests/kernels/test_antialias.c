@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // antialias: background edges alone, and layer edges too.
 #include "harness.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <string.h>

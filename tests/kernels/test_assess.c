@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // assess: certainty and thickness, each alone and both, over all pixels and over an instance's, whole and cropped.
 #include "harness.h"
+#include "shared/picture.h"
 
 #include <math.h>
 #include <string.h>

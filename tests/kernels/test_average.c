@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // average: means over the points about each pixel's surface, over keys that scatter made and holes that were filled.
 #include "points.h"
+#include "shared/means.h"
+#include "shared/measured.h"
+#include "shared/points.h"
 
 #include <math.h>
 #include <string.h>

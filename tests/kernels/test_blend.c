@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // blend: means of the discs on each pixel's nearest surface, over keys that splat made.
 #include "discs.h"
+#include "shared/measured.h"
 
 #include <math.h>
 #include <string.h>

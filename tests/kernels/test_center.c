@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // center: how far the tangent planes of measured points lie behind them in the middle of their pixels.
 #include "points.h"
+#include "shared/measured.h"
+#include "shared/points.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // coarsen: cells are emptied, and take the least limit of their pixels.
 #include "harness.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // compose: over opaque and transparent backgrounds, whole and cropped.
 #include "harness.h"
+#include "shared/colors.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // contour: perspective and orthographic views, all slopes, intervals from far finer than pixels to wider than the picture, level
 // surfaces, surfaces edge-on and without normals, far ones.
 #include "effect.h"
+#include "shared/effects.h"
 
 #include <math.h>
 #include <string.h>

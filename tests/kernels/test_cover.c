@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // cover: meshes over points, against float64.
 #include "harness.h"
+#include "shared/meshes.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // edl: radii, perspective and orthographic views, depths over seven decades, silhouettes.
 #include "effect.h"
+#include "shared/effects.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // extract: depth, world-space normal and source, each alone and all together, whole and cropped.
 #include "harness.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <string.h>

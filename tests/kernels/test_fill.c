@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // fill: both phases, both forms (paper, closed), both levels of quality, at levels 0 to 3.
 #include "harness.h"
+#include "shared/filling.h"
 
 #include <math.h>
 #include <string.h>

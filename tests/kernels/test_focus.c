@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // focus: sharp to the widest circles, perspective and orthographic views, crops, transparent film.
 #include "harness.h"
+#include "shared/picture.h"
 
 #include <math.h>
 #include <string.h>

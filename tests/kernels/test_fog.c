@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // fog: before, within and beyond its range, thin and thick, over opaque and translucent pixels.
 #include "effect.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // gather: soft points as records: balls of any radius, about the eye and behind it, sifted, lit, coloured; bit for bit the same.
 #include "points.h"
+#include "shared/balls.h"
 
 #include <math.h>
 #include <string.h>

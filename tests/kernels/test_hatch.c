@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // hatch: levels, spacings, perspective and orthographic views, normals edge-on and missing, all tones.
 #include "effect.h"
+#include "shared/effects.h"
 
 #include <math.h>
 #include <string.h>

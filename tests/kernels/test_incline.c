@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // incline: normals of cells from those around.
 #include "cells.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 #include <string.h>

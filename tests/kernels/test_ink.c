@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ink: every source of colour, over a picture and behind a sum of layers, with and without z, shares and blanked surfaces.
 #include "harness.h"
+#include "shared/picture.h"
 
 #include <math.h>
 #include <string.h>

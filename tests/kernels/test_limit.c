@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // limit: exact, and says whether anything is left.
 #include "harness.h"
+#include "shared/shadows.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // lit: points before, on and behind the surfaces of a map, with normals and without; what samples and maps add up to.
 #include "harness.h"
+#include "shared/shadows.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // locate: pixels of meshes as points, against float64.
 #include "harness.h"
+#include "shared/meshes.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // magnify: pixels that show the faces between cells.
 #include "cells.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // mark: exactly the points that the picture shows.
 #include "harness.h"
+#include "shared/shadows.h"
 
 #include <string.h>
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // merge: means over the points of each cell, over keys that scatter made.
 #include "points.h"
+#include "shared/points.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // normals: planes fitted on the screen, against float64 and against the plane that the points were taken from.
 #include "harness.h"
+#include "shared/measured.h"
 
 #include <math.h>
 #include <string.h>

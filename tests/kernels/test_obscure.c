@@ -2,6 +2,7 @@
 // obscure: taps against the reference, and the mean of the device's own taps; radii from a thousandth of a pixel to more than the
 // picture, depths over seven decades, normals edge-on.
 #include "harness.h"
+#include "shared/effects.h"
 
 #include <math.h>
 #include <string.h>

@@ -2,6 +2,7 @@
 // paint: images on triangles, against float64: every wrap, format and filter, from larger than the picture to a texel of its last
 // level; and places that are no numbers.
 #include "harness.h"
+#include "shared/meshes.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // paper: tints and grains, places of crops in the picture, transparent pixels.
 #include "harness.h"
+#include "shared/picture.h"
 
 #include <math.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // peel: limits, what comes through and keys bit by bit, blended colours within the table, tiles counted again.
 #include "harness.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // pull: exact, hence compared bit by bit.
 #include "harness.h"
+#include "shared/filling.h"
 
 static void check(struct harness *h, const struct view_args *fine, const uint64_t *keys, const uint32_t *from)
 {

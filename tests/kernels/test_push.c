@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // push: from every level of the pyramid to the one below, paper and refined; all pixels, and empty ones alone.
 #include "harness.h"
+#include "shared/filling.h"
 
 #include <string.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // raster: triangles of all sizes against float64; edges between triangles drawn once; cut triangles.
 #include "harness.h"
+#include "shared/meshes.h"
 
 #include <math.h>
 #include <string.h>

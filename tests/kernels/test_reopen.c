@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // reopen: what is found, shown and taken back, by the reference; hard stations; devices agree to the bit.
 #include "harness.h"
+#include "shared/filling.h"
 
 #include <math.h>
 #include <string.h>

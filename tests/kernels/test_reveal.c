@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // reveal: how far scans lie apart, of measured pixels and of those that show the surface of another; whole and cropped.
 #include "harness.h"
+#include "shared/picture.h"
 
 #include <string.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // scatter: the least key of every pixel, where the reference says which points may and which must be there.
 #include "points.h"
+#include "shared/points.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // shade: colours of every format, normals measured, filled, blended and estimated, Phong light.
 #include "harness.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <string.h>

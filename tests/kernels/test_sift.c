@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // sift: boxes that keep and cut, planes, hidden classes, hidden shapes, masks, fields, scans; degenerate and huge ones. Bits are equal on every device.
 #include "harness.h"
+#include "shared/points.h"
 
 #include <math.h>
 #include <string.h>

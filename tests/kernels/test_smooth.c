@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // smooth: the four filters, on pictures with measured and filled pixels.
 #include "harness.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // soft: balls along rays. The reference itself is held against numerical quadrature of the density [S Eq. 1, 5, 10, 11].
 #include "harness.h"
+#include "shared/balls.h"
 
 #include <math.h>
 #include <stdlib.h>

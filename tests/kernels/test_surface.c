@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // surface: normals in view space, 1 / max(|n.v|, C), d_eff.
 #include "harness.h"
+#include "shared/measured.h"
 
 #include <math.h>
 #include <string.h>

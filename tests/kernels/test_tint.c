@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // tint: bands along the cuts of boxes and planes, on pictures of all kinds.
 #include "harness.h"
+#include "shared/effects.h"
 
 #include <math.h>
 #include <string.h>

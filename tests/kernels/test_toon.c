@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // toon: numbers of bands, soft and hard edges, black albedos, no light, light far above 1.
 #include "effect.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

@@ -3,6 +3,7 @@
 // cover max(5/6 - k/3, 1/6) of the pixel, on a mesh 3/4; the rest shows the far neighbours.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/colors.h"
 
 #include <math.h>
 

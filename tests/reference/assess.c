@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What an analysis knows of the point that a pixel shows (kernel_args.h, assess_args).
+// What an analysis knows of the point that a pixel shows (shared/picture.h, assess_args).
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/picture.h"
 
 struct ref_assess ref_assess(const struct assess_args *args, const struct ref_planes *planes, const uint32_t *shapes, int x,
                              int y)

@@ -2,6 +2,8 @@
 // Means over the points within d_eff of a pixel's surface, weighted by a tent about the pixel's centre.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/means.h"
+#include "shared/words.h"
 
 #include <math.h>
 

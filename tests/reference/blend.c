@@ -2,6 +2,7 @@
 // SPEC 5, solid: means over the discs of a pixel that lie within d_eff behind the nearest.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/discs.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // SPEC 6: the least finite limit of the pixels that a cell has a part of.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 

@@ -2,6 +2,8 @@
 // SPEC 1 in float64: rays, d_eff, normals, keys, tangent planes.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/clips.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <string.h>

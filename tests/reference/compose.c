@@ -2,6 +2,7 @@
 // Premultiplied colour over the background.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/colors.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // Contour lines: where the height above a plane is a multiple of an interval.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

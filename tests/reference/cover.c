@@ -2,6 +2,7 @@
 // What a pixel shows of the triangle in front: normals, layer distance (SPEC 1), colour.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/meshes.h"
 
 #include <math.h>
 

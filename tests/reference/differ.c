@@ -2,6 +2,7 @@
 // SPEC 6: between which distances from a cell's plane the means of single scans lie.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 

@@ -3,6 +3,7 @@
 // orthographic.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

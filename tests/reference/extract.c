@@ -2,6 +2,7 @@
 // Passes for the artist: linear depth, world-space normal, and where each pixel's surface was measured.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/colors.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // [D 3.2, 3.3], SPEC 2.2: hole filling, one rule for background and for occluded pixels.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/filling.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,6 +3,7 @@
 // what lies behind mixes with it no wider than its own circle.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/picture.h"
 
 #include <math.h>
 

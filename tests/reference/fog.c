@@ -2,6 +2,7 @@
 // Fog: from nothing at its start to its density at its end, over premultiplied colours.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

@@ -3,6 +3,7 @@
 // picture of one pixel that the point fills.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/balls.h"
 
 #include <math.h>
 

@@ -3,6 +3,7 @@
 // world's unit; the darker the wider.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

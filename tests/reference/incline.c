@@ -2,6 +2,7 @@
 // [K II.C, Fig. 4], SPEC 6: the 24 triangles of which a cell is a corner, one by one.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // [X 3.3]: lines in one colour, in that of their points, or by depth; over a picture or behind what is blended already.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/picture.h"
 
 #include <math.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // [D 6], SPEC 4: a transparent surface casts a shadow as strong as its opacity, so what lies behind it casts, too.
 #include "reference.h"
+#include "shared/shadows.h"
 
 #include <math.h>
 

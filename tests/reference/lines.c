@@ -2,6 +2,7 @@
 // [X 3], SPEC 7: the least distance of a pixel to the discs that show there, every disc looked at.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/lines.h"
 
 #include <math.h>
 

@@ -2,6 +2,8 @@
 // [D 6], SPEC 4: lit if z <= z_map + d_eff, d_eff of the point as the light sees it.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/shadows.h"
+#include "shared/words.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // Where a pixel that shows a mesh lies: on its ray at the key's depth.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/meshes.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // [K II.D, Fig. 7, 8], SPEC 6: every triangle between the cells around a pixel, one by one.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 

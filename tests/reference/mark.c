@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Which points a picture shows.
 #include "reference.h"
+#include "shared/shadows.h"
 
 int ref_mark(const struct mark_args *args, const struct ref_planes *planes, uint32_t id)
 {

@@ -2,6 +2,7 @@
 // [K II.B], SPEC 6: the weighted mean of a cell's points up to gamma behind the nearest.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 

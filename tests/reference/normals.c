@@ -3,6 +3,7 @@
 // plane fitted by least squares over a window gives it.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/measured.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -2,6 +2,7 @@
 // Ambient obscurance: taps on a turned spiral, their mean over 5 x 5 pixels of the same layer.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

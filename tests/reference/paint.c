@@ -2,6 +2,7 @@
 // An image on a triangle: where the pixel's centre and its neighbours' lie on it, and what is there.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/meshes.h"
 
 #include <math.h>
 

@@ -3,6 +3,7 @@
 // lattice of numbers 8 pixels wide, blended between its nodes.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/picture.h"
 
 #include <math.h>
 

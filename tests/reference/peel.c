@@ -3,6 +3,7 @@
 // product of two float32 is exact in float64, so that rounding it once gives float32's own result.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/colors.h"
 
 #include <math.h>
 

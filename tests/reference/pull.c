@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // SPEC 2.2: a scatter at half the resolution is the least key of 2 x 2 pixels.
 #include "reference.h"
+#include "shared/filling.h"
 
 void ref_pull(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, int x, int y, uint64_t *key,
               uint32_t *from)

@@ -3,6 +3,7 @@
 // and two of the three coarse cells next to the pixel lie before it.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/filling.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // Which triangle a pixel's centre lies on, and how deep, whatever float32 and the rounding of corners to 1/256 pixel make of it.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/meshes.h"
 
 #include <math.h>
 

@@ -7,10 +7,16 @@
 #ifndef PT_REFERENCE_H
 #define PT_REFERENCE_H
 
-#include "kernel_args.h"
+#include "kernels.h"
+#include "shared/view.h"
 
 #include <stddef.h>
 #include <stdint.h>
+
+struct clip_view;
+struct disc_args;
+struct mesh_args;
+struct station_args;
 
 #define REF_EMPTY_KEY 0x7F800000FFFFFFFFull
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What stations looked through (kernel_args.h, reopen_args), in float64: open where the cells, faces or ranges that float32 may take
+// What stations looked through (shared/filling.h, reopen_args), in float64: open where the cells, faces or ranges that float32 may take
 // disagree.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/filling.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How far scans lie apart at the measured pixel whose surface a pixel shows.
 #include "reference.h"
+#include "shared/picture.h"
 
 struct ref_reveal ref_reveal(const struct reveal_args *args, const struct ref_planes *planes, const float *apart, int x, int y)
 {

@@ -3,6 +3,7 @@
 // source's (paper) or blended from the surfaces around it (refined, SPEC 2.2).
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,6 +3,7 @@
 // any, in no box that cuts, and on the right side of every plane.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/points.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // [D 3.4], SPEC 2.3: 3 x 3 low-pass over the neighbours of the same layer, weights renormalised.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/colors.h"
 
 #include <math.h>
 #include <stdlib.h>

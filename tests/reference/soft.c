@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Balls along a ray [S], in double: density by its closed form, pieces between two places where balls begin or end, front to back.
 #include "reference.h"
+#include "shared/balls.h"
 
 #include <float.h>
 #include <math.h>

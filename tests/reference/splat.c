@@ -2,6 +2,8 @@
 // SPEC 5, solid: which pixels a flat disc covers, by the ray through the pixel's centre and the disc's plane.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/discs.h"
+#include "shared/words.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 // SPEC 1, effective layer distance: d_eff = max(d_min, K spacing, footprint, 4 ulp) / max(|n.v|, C), and what sigma makes of it.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/measured.h"
 
 #include <math.h>
 

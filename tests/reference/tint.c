@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The colour of the surface near a cut (kernel_args.h, tint_args): of the clip where it is strongest.
+// The colour of the surface near a cut (shared/effects.h, tint_args): of the clip where it is strongest.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

@@ -3,6 +3,7 @@
 // last.
 #include "reference.h"
 #include "tolerances.h"
+#include "shared/effects.h"
 
 #include <math.h>
 

@@ -5,6 +5,7 @@
 #include "support.h"
 
 #include "reference.h"
+#include "shared/balls.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -6,6 +6,7 @@
 #include "run/layers.h"
 #include "run/residency.h"
 #include "support.h"
+#include "shared/points.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What every point knows: neighbours against all distances, kinds and footprints on known shapes, hard cases, cancel.
-#include "kernel_args.h"
 #include "scene/analysis.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
+#include "shared/words.h"
 
 #include <math.h>
 #include <stdio.h>

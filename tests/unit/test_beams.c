@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Beams: a station's interval is found from its samples; footprints end at its cells, and at half of them beside bars.
-#include "kernel_args.h"
 #include "scene/analysis.h"
 #include "scene/beams.h"
 #include "scenes/support.h"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Free space: what a station saw through is marked, and nothing else; hidden and shown in pictures.
-#include "kernel_args.h"
 #include "scene/analysis.h"
 #include "scene/free_space.h"
 #include "scenes/support.h"

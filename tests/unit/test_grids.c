@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What scanners' grids tell: normals that neighbours in space would mix, and borders exactly where depth steps or nothing came back.
-#include "kernel_args.h"
+#include "shared/words.h"
 #include "scene/analysis.h"
 #include "scenes/support.h"
 

@@ -3,6 +3,11 @@
 // region decides as the whole picture does (DESIGN rule 3, SPEC 8).
 #include "plan/passes.h"
 #include "scenes/support.h"
+#include "shared/filling.h"
+#include "shared/lines.h"
+#include "shared/measured.h"
+#include "shared/picture.h"
+#include "shared/points.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -4,6 +4,7 @@
 // Edges are few: their new colours are listed by bands of rows and applied when every pixel has been looked at.
 #include "antialias.h"
 #include "device_cpu/rows.h"
+#include "shared/colors.h"
 
 enum { BAND_ROWS = 16 };
 

@@ -9,6 +9,7 @@
 #define PT_ANTIALIAS_H
 
 #include "device_cpu/vector_math.h"
+#include "shared/colors.h"
 
 static const int8_t pt_cross[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // assess: certainty and thickness of the points that pixels show, into the crop; twin of shaders/kernels/assess.comp
 #include "device_cpu/rows.h"
+#include "shared/picture.h"
 
 static void assess_row(void *context, uint32_t y)
 {

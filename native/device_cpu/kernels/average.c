@@ -7,6 +7,7 @@
 #include "device_cpu/kernels/shade.h"
 #include "device_cpu/kernels/sums.h"
 #include "device_cpu/rows.h"
+#include "shared/means.h"
 
 enum {
     BLOCK = 256,    // points

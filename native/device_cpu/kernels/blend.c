@@ -6,6 +6,7 @@
 // 64 before they could overflow.
 #include "bins.h"
 #include "sums.h"
+#include "shared/measured.h"
 
 // Of a pixel: colour 3, opacity, normal 3, weight; or what PT_BLEND_LIGHTS lights lose, and opacity.
 enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE, SUMS = PT_SUMS };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Normals of filled pixels: blended over a window of what its pixels show (SPEC 2.2, refined; kernel_args.h). Twin of
+// Normals of filled pixels: blended over a window of what its pixels show (SPEC 2.2, refined; shared/colors.h). Twin of
 // shaders/kernels/shade.comp.
 //
 // The four pixels at (+-dx, +-dy) weigh the same: they are summed first, columns before rows, and the order is the same where
@@ -8,6 +8,7 @@
 #define PT_BLEND_NORMALS_H
 
 #include "device_cpu/picture_rows.h"
+#include "shared/colors.h"
 
 enum {
     PT_BLEND_MOST = 8, // radius
@@ -23,7 +24,7 @@ struct pt_blend { // of the pixels of a row
     const struct pt_seen_row *const *around; // rows from `most` below on
 };
 
-// Radius of a pixel's window, of a wide blend: kernel_args.h.
+// Radius of a pixel's window, of a wide blend: shared/colors.h.
 static inline vf pt_blend_reach(const struct pt_blend *blend, vf z, vf limit)
 {
     vf spacings = limit * vf_rcp(vf_footprint(blend->view, z));

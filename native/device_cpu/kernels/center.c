@@ -6,6 +6,7 @@
 #include "device_cpu/cpu.h"
 #include "device_cpu/rows.h"
 #include "device_cpu/vector_math.h"
+#include "shared/measured.h"
 
 enum { BLOCK = 256 }; // pixels of a row
 

@@ -4,6 +4,7 @@
 #define PT_CLIP_ROW_H
 
 #include "device_cpu/vector_math.h"
+#include "shared/clips.h"
 
 // Row k of (lo + R p) + hi.
 static inline vf pt_clip_row(const struct clip_view *clip, int k, const vf p[3])

@@ -2,6 +2,7 @@
 // coarsen: an image buffer without points, and what lies behind the layers taken so far, cell by cell; twin of
 // shaders/kernels/coarsen.comp
 #include "device_cpu/rows.h"
+#include "shared/ranges.h"
 
 static inline int32_t floor_of(float a) { return (int32_t)a - (a < (float)(int32_t)a); }
 

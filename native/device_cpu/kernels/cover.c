@@ -2,6 +2,7 @@
 // cover: pixels in which a mesh lies in front show it; its normal, layer distance and colour there; twin of
 // shaders/kernels/cover.comp
 #include "triangle.h"
+#include "shared/meshes.h"
 
 static void write_shown(const struct pt_cpu_call *call, const struct pt_triangle *t, size_t at, vi z, const vf n[4], vm front)
 {

@@ -11,6 +11,7 @@
 #include "device_cpu/cpu.h"
 #include "device_cpu/rows.h"
 #include "device_cpu/vector_math.h"
+#include "shared/discs.h"
 
 // PT_LANES of them.
 struct pt_discs {

@@ -3,6 +3,7 @@
 //
 // Rows of f(z) in a ring: a logarithm a pixel, and every neighbour is a plain load.
 #include "device_cpu/picture_rows.h"
+#include "shared/effects.h"
 
 enum { BAND_ROWS = 32 };
 

@@ -2,6 +2,7 @@
 // extract: the passes beside the colour, into the crop: z, world-space normal, source, shadow (SPEC 2.2: scholars must see what
 // is scan and what is invention); twin of shaders/kernels/extract.comp
 #include "extract.h"
+#include "shared/colors.h"
 
 // away: where discs were drawn, the row's.
 static void extract_source(const struct extract_args *args, const uint64_t *keys, const uint32_t *from, const float *away,

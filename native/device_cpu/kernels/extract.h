@@ -4,6 +4,7 @@
 #define PT_EXTRACT_H
 
 #include "device_cpu/rows.h"
+#include "shared/colors.h"
 
 // Row and column of pixels of a plane: a float quotient is at most one row off, also where the index has more than 24 bits.
 static inline void pt_place_of(vi index, uint32_t width, vi *x, vi *y)

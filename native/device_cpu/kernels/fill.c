@@ -9,6 +9,7 @@
 // for such only where the one before it changed something. What is listed is worked on by whole vectors.
 #include "fill_background.h"
 #include "fill_occluded.h"
+#include "shared/filling.h"
 
 // ---- deciding ------------------------------------------------------------------------------------------------------------
 

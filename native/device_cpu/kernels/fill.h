@@ -4,6 +4,7 @@
 #define PT_FILL_H
 
 #include "device_cpu/rows.h"
+#include "shared/filling.h"
 
 enum { BAND_ROWS = 16, RING = 8, WORDS = sizeof(vi_words) / 8 };
 

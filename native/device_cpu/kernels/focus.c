@@ -4,6 +4,7 @@
 // Rows lie in a ring as separate vectors. Blocks of 16 x 16 pixels look no farther than the largest circle that may reach them:
 // taps beyond would add nothing.
 #include "device_cpu/picture_rows.h"
+#include "shared/picture.h"
 
 enum { BLOCK = 16, CHANNELS = 7, REACH_MOST = PT_FOCUS_MOST };
 

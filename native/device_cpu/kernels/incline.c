@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // incline: places of cells -> their normals [K II.C]; twin of shaders/kernels/incline.comp
 #include "device_cpu/kernels/ranges.h"
+#include "shared/ranges.h"
 
 // The cells around, anticlockwise.
 static const int32_t ring[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};

@@ -2,6 +2,7 @@
 // ink: lines get their colour. [X 3.3]; twin of shaders/kernels/ink.comp
 #include "device_cpu/rows.h"
 #include "shade.h"
+#include "shared/picture.h"
 
 struct ink {
     const struct ink_args *args;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // limit: from where on a light's next map of a faint caster sees its points [D 6]; twin of shaders/kernels/limit.comp
 #include "device_cpu/rows.h"
+#include "shared/shadows.h"
 
 static void limit_row(void *context, uint32_t y)
 {

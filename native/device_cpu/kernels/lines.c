@@ -5,6 +5,7 @@
 // columns apart.
 #include "antialias.h"
 #include "device_cpu/rows.h"
+#include "shared/lines.h"
 
 enum { BAND_ROWS = 64, PAD = 32 }; // rows that a thread takes at once; floats on each side of a row
 

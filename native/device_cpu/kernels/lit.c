@@ -3,6 +3,7 @@
 //
 // Words of a cloud's points belong to one chunk each, so threads never meet. Lit points are not written at all.
 #include "device_cpu/rows.h"
+#include "shared/shadows.h"
 
 struct lit {
     const struct pt_cpu_call *call;

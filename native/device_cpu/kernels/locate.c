@@ -2,6 +2,7 @@
 // locate: where pixels that show a mesh lie, and which way they face, as points of a cloud; twin of
 // shaders/kernels/locate.comp
 #include "triangle.h"
+#include "shared/meshes.h"
 
 // 2. to the nearest of 8191 steps a side; what is not a number is no normal.
 static vi encode_normal(const vf n[3])

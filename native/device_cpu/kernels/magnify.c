@@ -5,6 +5,7 @@
 // right, so that each pixel meets its faces in the same order: what cells say is then one number for all lanes, and what two passes over a face
 // would find anew is found once a cell. Pixels that no face covers look around as the twin does.
 #include "device_cpu/kernels/ranges.h"
+#include "shared/ranges.h"
 
 #include <math.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // mark: which points the picture shows (SPEC 4: shadows of no others are computed); twin of shaders/kernels/mark.comp
 #include "device_cpu/rows.h"
+#include "shared/shadows.h"
 
 static void mark_row(void *context, uint32_t y)
 {

@@ -6,6 +6,7 @@
 
 #include "device_cpu/cpu.h"
 #include "device_cpu/vector_math.h"
+#include "shared/meshes.h"
 
 #include <math.h>
 

@@ -6,6 +6,7 @@
 // Rows are seen as depths and what is linear in them. Where most pixels of a vector are asked for it takes its neighbours by
 // plain loads; of the others those that are asked for are packed, so that sparse clouds fill the lanes too.
 #include "device_cpu/picture_rows.h"
+#include "shared/measured.h"
 
 enum { BAND_ROWS = 32, ROWS_MOST = 2 * 16 + 1 };
 
@@ -16,7 +17,7 @@ struct depth_row {
 struct center {            // PT_LANES pixels of a row
     uint32_t at[PT_LANES]; // columns, counted from the row's pad on; some of the row where nobody asks
     vf z, w;
-    vf distance, slope, step[2]; // what belongs to the same surface: kernel_args.h
+    vf distance, slope, step[2]; // what belongs to the same surface: shared/measured.h
     vf reach;                    // radius of the window
     int32_t most;                // of reach
     vm ours;
@@ -98,7 +99,7 @@ static uint32_t larger(int32_t a, int32_t b)
     return p > q ? p : q;
 }
 
-// Radius of the pixels' windows: kernel_args.h.
+// Radius of the pixels' windows: shared/measured.h.
 static void find_reach(const struct normals_args *args, struct center *c)
 {
     const vf zero = vf_zero();

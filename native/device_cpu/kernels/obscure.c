@@ -2,6 +2,7 @@
 // obscure: ambient obscurance within a view-space radius; twin of shaders/kernels/obscure.comp
 //   1. every pixel's taps   2. the mean over 5 x 5 of them, and the colour
 #include "device_cpu/picture_rows.h"
+#include "shared/effects.h"
 
 enum { BAND_ROWS = 32, REACH = PT_OBSCURE_BLUR, RING = 2 * REACH + 1 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // paint: pixels that show a mesh take its image's colour; twin of shaders/kernels/paint.comp
 #include "texture.h"
+#include "shared/meshes.h"
 
 static void paint_row(void *context, uint32_t y)
 {

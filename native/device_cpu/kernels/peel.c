@@ -2,6 +2,7 @@
 // peel: a finished layer is blended behind those before it, and says what may show behind it. [D 4, 5], SPEC 3; twin of
 // shaders/kernels/peel.comp. Works on rows of tiles.
 #include "peel.h"
+#include "shared/colors.h"
 
 struct peel {
     const struct peel_args *args;

@@ -5,6 +5,7 @@
 #define PT_PEEL_H
 
 #include "device_cpu/rows.h"
+#include "shared/colors.h"
 
 enum { PT_TILE = 1 << PT_TILE_LEVEL }; // a whole number of vectors
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // pull: 2 x 2 -> 1, the least key: what a scatter at half the resolution gives. SPEC 2.2; twin of shaders/kernels/pull.comp
 #include "device_cpu/rows.h"
+#include "shared/filling.h"
 
 struct cells { // of PT_LANES children
     vi z, id, from;

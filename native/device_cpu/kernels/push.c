@@ -4,6 +4,7 @@
 //
 // Vectors walk along coarse cells: what the cells' surfaces give is fetched once for the four pixels of each.
 #include "device_cpu/rows.h"
+#include "shared/filling.h"
 
 struct push {
     const struct pt_cpu_call *call;

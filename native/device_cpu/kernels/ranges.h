@@ -4,6 +4,7 @@
 #define PT_RANGES_H
 
 #include "device_cpu/rows.h"
+#include "shared/ranges.h"
 
 // How far behind z a point of the same surface may lie. cells: their view.
 static inline vf pt_range_gamma(const struct view_args *cells, float gamma, float gamma_cells, vf z)

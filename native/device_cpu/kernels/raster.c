@@ -5,6 +5,7 @@
 // plane as in scatter.
 #include "mesh.h"
 #include "texture.h"
+#include "shared/meshes.h"
 
 enum { BATCH = 128 }; // triangles
 

@@ -4,6 +4,7 @@
 #define PT_RECOLOR_H
 
 #include "device_cpu/rows.h"
+#include "shared/colors.h"
 
 // Where the colours lie on the ramp. scalars: of the points, where they are its source.
 static inline vf pt_place_on_ramp(const struct shade_args *args, const vf towards[2], vf z, vf scalars)

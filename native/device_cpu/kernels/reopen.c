@@ -3,6 +3,7 @@
 //
 // Which cell a place falls into decides pixels: every sum is written in one order, so that all devices agree.
 #include "extract.h"
+#include "shared/filling.h"
 
 struct planes { // of a row
     uint64_t *keys, *kept;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // reveal: how far scans lie apart where pixels show an instance, into the crop; twin of shaders/kernels/reveal.comp
 #include "device_cpu/rows.h"
+#include "shared/picture.h"
 
 static void reveal_row(void *context, uint32_t y)
 {

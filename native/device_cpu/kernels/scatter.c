@@ -8,6 +8,7 @@
 // show.
 #include "device_cpu/cpu.h"
 #include "device_cpu/vector_math.h"
+#include "shared/points.h"
 
 enum { BINS = 256 }; // of rows
 

@@ -2,6 +2,7 @@
 // shade: id -> colour and normal, Phong. [D 3.1], deferred: only what the picture shows is lit; twin of
 // shaders/kernels/shade.comp
 #include "shade.h"
+#include "shared/colors.h"
 
 enum { BAND_ROWS = 32, CHANNELS = 5 };
 

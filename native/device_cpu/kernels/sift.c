@@ -5,6 +5,7 @@
 // Distances to a clip are sums of products in one written order, as scatter's: what is cut is cut on every device.
 #include "clip.h"
 #include "device_cpu/cpu.h"
+#include "shared/points.h"
 
 struct sift {
     const struct pt_cpu_call *call;

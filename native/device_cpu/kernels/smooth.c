@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // smooth: 3 x 3 low-pass over the neighbours of the same layer. [D 3.4, Table 1]; twin of shaders/kernels/smooth.comp
 #include "smooth.h"
+#include "shared/colors.h"
 
 enum { BAND_ROWS = 32, CHANNELS = 5 };
 

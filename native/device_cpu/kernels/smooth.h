@@ -4,6 +4,7 @@
 #define PT_SMOOTH_H
 
 #include "device_cpu/picture_rows.h"
+#include "shared/colors.h"
 
 // A row's z and colour; colours of empty pixels may be anything, NaN too.
 struct pt_color_row {

@@ -2,6 +2,7 @@
 // soft: the balls of soft points before each pixel, front to back [S]. SPEC 5, soft; twin of shaders/kernels/soft.comp
 #include "soft_balls.h"
 #include "soft_discs.h"
+#include "shared/balls.h"
 
 struct soft {
     struct pt_soft_bins bins;

@@ -5,6 +5,7 @@
 #define PT_SOFT_BINS_H
 
 #include "device_cpu/rows.h"
+#include "shared/balls.h"
 
 #include <stdatomic.h>
 

@@ -3,6 +3,7 @@
 //
 // Tile by tile, in memory that the first-level cache holds.
 #include "bins.h"
+#include "shared/points.h"
 
 enum {
     TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE,

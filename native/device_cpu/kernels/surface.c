@@ -3,6 +3,7 @@
 #include "device_cpu/cpu.h"
 #include "device_cpu/rows.h"
 #include "device_cpu/vector_math.h"
+#include "shared/measured.h"
 
 // The instance's pixels of a block of a row, packed: with a point a pixel half the lanes of a vector show another surface or
 // none.

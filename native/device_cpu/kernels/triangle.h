@@ -4,6 +4,7 @@
 #define PT_TRIANGLE_H
 
 #include "device_cpu/rows.h"
+#include "shared/meshes.h"
 
 struct pt_triangle {
     vi corner[3];      // first float of each vertex
