@@ -4,6 +4,7 @@
 
 #include "passes.h"
 #include "scene/scans.h"
+#include "shared/picture.h"
 #include "shared/points.h"
 #include "shared/ranges.h"
 

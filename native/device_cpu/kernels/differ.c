@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // differ: points of an image buffer's cells -> between which depths the means of single scans lie; twin of shaders/kernels/differ.comp
 #include "device_cpu/kernels/cells.h"
+#include "shared/ranges.h"
 
 // Of a cell, for each of PT_DIFFER_SCANS scans: points, and how far they lie off the cell's plane.
 

@@ -466,9 +466,8 @@ static void show(const struct walk *walk, uint32_t x, uint32_t y, uint32_t cy, f
     if (args->with_span)
         vf_store_where((float *)PT_DATA(walk->call, magnify, span) + at, distance, some);
     if (args->with_apart) {
-        const vi cell = pick_cell(c, which);
-        const vf apart = vf_gather(PT_DATA(walk->call, magnify, most), cell, some) -
-                         vf_gather(PT_DATA(walk->call, magnify, least), cell, some);
+        const vf apart = vf_gather(PT_DATA(walk->call, magnify, most), which, some) -
+                         vf_gather(PT_DATA(walk->call, magnify, least), which, some);
         vf_store_where((float *)PT_DATA(walk->call, magnify, apart) + at, vf_max(apart, zero), some);
     }
 }

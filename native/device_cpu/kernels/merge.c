@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // merge: points of an image buffer's cells -> their mean place, colour and opacity [K II.B]; twin of shaders/kernels/merge.comp
 #include "device_cpu/kernels/cells.h"
+#include "shared/ranges.h"
 
 // Of a cell: weight, place across and up, share of the depth, colour 3, opacity.
 
