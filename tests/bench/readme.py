@@ -249,7 +249,8 @@ def update(result: dict[str, Any], root: Path) -> str:
         plots.scans(result["scans"], root / ".pictures/scans.png", title)
     if result.get("ranges"):
         import ranges
-        parts |= {"ranges paper": ranges.paper(result["ranges"]), "ranges surfaces": ranges.surfaces(result["ranges"])}
+        when = f"{title}; {result['load']:.0f} programs ran beside it.\n\n"
+        parts |= {"ranges paper": when + ranges.paper(result["ranges"]), "ranges surfaces": when + ranges.surfaces(result["ranges"])}
         plots.ranges(result["ranges"], root / ".pictures/ranges.png", title)
     if any(row["device"] != "cpu" for row in joined(result, "graphics")):
         parts["graphics"] = graphics(result)

@@ -120,6 +120,31 @@ def test_range_images_are_not_analyzed():
     check(found.shown.clouds[0].cloud is built, "built again")
 
 
+def test_balance_is_live():
+    """What a scan's light is multiplied by, and turning it off, change the picture at once."""
+    setup()
+    positions = sphere(6000, 1.5, (0, 0, 0))[0]
+    obj = add_points(positions, np.full((6000, 4), 128, np.uint8))
+    obj.data.attributes.new("scan", 'FLOAT', 'POINT').data.foreach_set("value", (np.asarray(positions)[:, 0] > 0).astype(np.float32))
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.patina_scans_list()
+    yield lambda: settled(6000)
+    group, found = obj.patina.points, shown()
+
+    def red():
+        color = found.shown.color
+        return float(color[color[..., 3] > 0][:, 0].mean())
+
+    light = [red()]
+    group.scans[1].balance = (0.5, 1.0, 1.0)
+    for use in (True, False):
+        before = found.pictures
+        group.use_balance = use
+        yield lambda before=before: newer(before)() and settled(6000)
+        light.append(red())
+    check(light[1] < 0.85 * light[0] and abs(light[2] - light[0]) < 1e-4, f"{light}")
+
+
 def test_depth_of_field_of_the_camera():
     """A view through the camera has its depth of field, a free view has none."""
     scene = setup()

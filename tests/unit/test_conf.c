@@ -174,14 +174,16 @@ static void test_bad_grids(void **state)
         {"4", "1 0\n1 1\n0\n0\n1 2\n0\n", "bad.ply: the range_grid of 6 cells is left out: num_cols and num_rows say 4 x 2", 0},
         {"99999999999", "1 0\n1 1\n0\n0\n1 2\n0\n", "bad.ply: the range_grid of 6 cells is left out", 0},
         {"3", "1 0\n1 7\n0\n0\n1 2\n1 -1\n", "bad.ply: 2 cells of the range_grid name points that are not there, and 0 one", 1},
-        {"3", "1 0\n1 0\n1 0\n0\n1 2\n0\n", "bad.ply: 0 cells of the range_grid name points that are not there, and 2 one that another cell has", 1},
+        {"3", "1 0\n1 0\n1 0\n0\n1 2\n0\n",
+         "bad.ply: 0 cells of the range_grid name points that are not there, and 2 one that another cell has", 1},
     };
     put_grid("one.ply", 2, "");
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         char text[1024];
         snprintf(text, sizeof text,
-                 ASCII "obj_info num_cols %s\nobj_info num_rows 2\nelement vertex 3\n" XYZ
-                       "element range_grid 6\nproperty list uchar int vertex_indices\nend_header\n0 0 1\n0.1 0 1\n0.2 0.1 1\n%s",
+                 ASCII
+                 "obj_info num_cols %s\nobj_info num_rows 2\nelement vertex 3\n" XYZ
+                 "element range_grid 6\nproperty list uchar int vertex_indices\nend_header\n0 0 1\n0.1 0 1\n0.2 0.1 1\n%s",
                  bad[i].columns, bad[i].cells);
         put("bad.ply", text);
         patina_file *file = open_conf("bmesh bad.ply 0 0 0 0 0 0 1\nbmesh one.ply 5 0 0 0 0 0 1\n");
@@ -271,9 +273,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_places),     cmocka_unit_test(test_bad_scans),
-        cmocka_unit_test(test_bad_grids), cmocka_unit_test(test_odd_scans),
-        cmocka_unit_test(test_ptx_within), cmocka_unit_test(test_cancel),
+        cmocka_unit_test(test_places),    cmocka_unit_test(test_bad_scans),  cmocka_unit_test(test_bad_grids),
+        cmocka_unit_test(test_odd_scans), cmocka_unit_test(test_ptx_within), cmocka_unit_test(test_cancel),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
