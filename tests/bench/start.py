@@ -51,6 +51,7 @@ def measure(rounds: int) -> str:
 
 def run(module: str, folder: str) -> None:
     sys.path.append(folder)
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(Path(folder) / "compiled")  # as installed add-ons have it
     import addon_utils  # is there once bpy is
     start = time.process_time()
     assert addon_utils.enable(module), module
