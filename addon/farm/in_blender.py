@@ -35,7 +35,8 @@ def enable(version: list) -> None:
             fail("the Patina add-on is not installed in this Blender")
         if not addon_utils.check(module.__name__)[1]:
             addon_utils.enable(module.__name__)
-    found = list(getattr(module, "bl_info", None) and module.bl_info["version"] or addon_utils.module_bl_info(module).get("version", ()))
+    found = (getattr(module, "bl_info", None) or addon_utils.module_bl_info(module)).get("version", ())
+    found = [int(part) for part in (found.split(".") if isinstance(found, str) else found)]  # a text where Blender took it from the manifest
     if found != version:
         fail(f"the job was made with Patina {'.'.join(map(str, version))}; here is {'.'.join(map(str, found))}")
 

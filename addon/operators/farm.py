@@ -92,7 +92,7 @@ def describe(scene: Scene, kind: str, tiles: tuple[int, int]) -> dict[str, Any]:
     if kind == "tiles":
         _check_tiles(scene, tiles)
     described = {"name": Path(bpy.data.filepath or "untitled").stem, "kind": kind, "by": "blender", "program": bpy.app.binary_path or "blender",
-                 "version": f"Blender {bpy.app.version_string}", "addon": list(_version()), "scene": scene.name, "directory": str(Path.home()),
+                 "version": f"Blender {bpy.app.version_string}", "addon": _version(), "scene": scene.name, "directory": str(Path.home()),
                  "output": _output(scene, kind), "files": _files()}
     return {**described, **({"frames": numbers} if kind == "frames" else {"tiles": list(tiles), "frame": scene.frame_current})}
 
@@ -115,8 +115,9 @@ def _check_tiles(scene: Scene, tiles: tuple[int, int]) -> None:
         raise Refused(f"tiles of {size[0] // tiles[0]} x {size[1] // tiles[1]} pixels are too small: fewer columns and rows")
 
 
-def _version() -> tuple[int, ...]:
-    return tuple(sys.modules[__package__.rpartition(".")[0]].bl_info["version"])
+def _version() -> list[int]:
+    version = sys.modules[__package__.rpartition(".")[0]].bl_info["version"]
+    return [int(part) for part in (version.split(".") if isinstance(version, str) else version)]  # a text where Blender took it from the manifest
 
 
 def _output(scene: Scene, kind: str) -> str:
