@@ -303,7 +303,8 @@ int pt_grids_describe(const struct pt_grids *grids, const patina_analysis_desc *
     pt_ellipse_of(a, b, axis, &major, &minor);
     // 3. What the grid knows better.
     const int border = ends[0] || ends[1], inner = on[0] == 2 && on[1] == 2;
-    if (found && rough <= FLAT) {
+    if (found && rough <= FLAT &&
+        !(hood->has_normal && hood->certainty >= CERTAIN)) { // of several scans' points it is steadier
         hood->has_normal = 1;
         memcpy(hood->normal, normal, sizeof normal);
         hood->certainty = fmax(hood->certainty, CERTAIN * (1.0 - rough));
