@@ -72,13 +72,13 @@ struct pt_device_ops {
     // PATINA_ERROR_CANCELLED.
     int (*run)(struct patina_device *device, enum pt_kernel kernel, const void *arguments, size_t argument_size,
                struct pt_buffer *const *buffers, uint32_t buffer_count, const atomic_int *cancel);
-    // Runs the tail of a plan (plan.h, finish) as one, without the planes between its passes. NULL where a device gains
-    // nothing by it. finishes: how many of these passes it takes, 0 or from the first on; their buffers are not known yet.
+    // Runs the tail of a plan, its last passes, as one, without the planes between its passes. NULL where a device gains
+    // nothing by it. tail_length: how many of these passes it takes, 0 or from the first on; their buffers are not known yet.
     // NULL: all there are.
-    uint32_t (*finishes)(const struct pt_bound_pass *passes, uint32_t count);
-    int (*finish_picture)(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count);
+    uint32_t (*tail_length)(const struct pt_bound_pass *passes, uint32_t count);
+    int (*run_tail)(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count);
     // Waits for all work (so that a clock means something).
-    int (*finish)(struct patina_device *device);
+    int (*wait)(struct patina_device *device);
 };
 
 struct patina_device {

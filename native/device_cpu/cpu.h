@@ -62,12 +62,12 @@ static inline uint32_t pt_chunk_instance(const uint32_t *begins, uint32_t chunk,
 // A kernel returns PATINA_OK, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED.
 typedef int pt_cpu_kernel(const struct pt_cpu_call *call);
 
-// Kernels that run as one: see device.h, finish.
+// Kernels that run as one: see device.h, run_tail.
 struct pt_cpu_pass {
     enum pt_kernel kernel;
     struct pt_cpu_call call;
 };
-typedef int pt_cpu_finish(const struct pt_cpu_pass *passes, uint32_t count);
+typedef int pt_cpu_tail(const struct pt_cpu_pass *passes, uint32_t count);
 
 // The levels that this build has, the best first: X(name, whether the processor knows it). Kernels are compiled once for each
 // (build/CMakeLists.txt), as PT_ISA.
@@ -87,7 +87,7 @@ typedef int pt_cpu_finish(const struct pt_cpu_pass *passes, uint32_t count);
 struct pt_cpu_level {
     const char *name;
     pt_cpu_kernel *kernels[PT_KERNEL_COUNT];
-    pt_cpu_finish *finish;
+    pt_cpu_tail *tail;
 };
 #define PT_X(level, known) extern const struct pt_cpu_level pt_cpu_level_##level;
 PT_EACH_LEVEL(PT_X)
@@ -101,7 +101,7 @@ PT_EACH_LEVEL(PT_X)
 #define PT_X(name) pt_cpu_kernel PT_KERNEL_ENTRY(name);
 PT_EACH_KERNEL(PT_X)
 #undef PT_X
-pt_cpu_finish PT_KERNEL_ENTRY(finish);
+pt_cpu_tail PT_KERNEL_ENTRY(tail);
 #endif
 
 #endif

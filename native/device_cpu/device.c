@@ -122,7 +122,7 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
     return error;
 }
 
-static int cpu_finish_picture(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
+static int cpu_run_tail(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
 {
     struct cpu_device *cpu = (struct cpu_device *)device;
     struct pt_cpu_pass *bound = malloc(count * sizeof *bound);
@@ -135,14 +135,14 @@ static int cpu_finish_picture(struct patina_device *device, const struct pt_boun
                                          .pool = cpu->pool,
                                          .scratch = cpu->scratch}};
     if (!error)
-        error = cpu->level->finish(bound, count);
+        error = cpu->level->tail(bound, count);
     free(bound);
     if (error)
         return pt_fail(&device->handle, error, "%s: out of memory for rows of the picture", device->info.name);
     return PATINA_OK;
 }
 
-static int cpu_finish(struct patina_device *device)
+static int cpu_wait(struct patina_device *device)
 {
     (void)device;
     return PATINA_OK;
@@ -166,8 +166,8 @@ static const struct pt_device_ops cpu_ops = {
     .buffer_read = cpu_buffer_read,
     .buffer_fill = cpu_buffer_fill,
     .run = cpu_run,
-    .finish_picture = cpu_finish_picture,
-    .finish = cpu_finish,
+    .run_tail = cpu_run_tail,
+    .wait = cpu_wait,
 };
 
 int pt_device_cpu_create(const patina_device_desc *desc, const char *level, struct patina_device **out)

@@ -5,4 +5,4 @@
 #define PT_NAME_(isa) "cpu-" #isa
 #define PT_NAME(isa) PT_NAME_(isa)
 #define PT_X(name) PT_KERNEL_ENTRY(name),
-const struct pt_cpu_level PT_CONCAT(pt_cpu_level_, PT_ISA) = {PT_NAME(PT_ISA), {PT_EACH_KERNEL(PT_X)}, PT_KERNEL_ENTRY(finish)};
+const struct pt_cpu_level PT_CONCAT(pt_cpu_level_, PT_ISA) = {PT_NAME(PT_ISA), {PT_EACH_KERNEL(PT_X)}, PT_KERNEL_ENTRY(tail)};

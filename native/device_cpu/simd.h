@@ -72,7 +72,7 @@ static inline void vi_merge_keys(uint64_t *keys, vi z, vi id, vm m)
 }
 // vf_put, vf_put4, vf_put3: writes to the picture, which is read later and by others. count <= PT_LANES pixels of one, four or three
 // floats. Past the caches where whole lines of theirs are at hand: a line of which some is stored and some streamed costs a trip
-// to memory for each (finish took 35 ms with AVX2 in place of 10.5).
+// to memory for each (the fused tail took 35 ms with AVX2 in place of 10.5).
 static inline void vf_put(float *p, vf a, uint32_t count) { vf_store_where(p, a, vm_first(count)); }
 static inline void vf_put3(float *p, const vf n[3], uint32_t count)
 {

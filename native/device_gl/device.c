@@ -238,18 +238,18 @@ static int fill_buffer(struct pt_gl_device *d, void *context)
 
 static int run_kernel(struct pt_gl_device *d, void *context) { return pt_gl_run(d, context); }
 
-struct finish_call {
+struct tail_call {
     const struct pt_bound_pass *passes;
     uint32_t count;
 };
 
-static int finish_picture(struct pt_gl_device *d, void *context)
+static int run_tail(struct pt_gl_device *d, void *context)
 {
-    const struct finish_call *f = context;
-    return pt_gl_finish_picture(d, f->passes, f->count);
+    const struct tail_call *f = context;
+    return pt_gl_run_tail(d, f->passes, f->count);
 }
 
-static int finish_work(struct pt_gl_device *d, void *unused)
+static int wait_for_work(struct pt_gl_device *d, void *unused)
 {
     (void)unused;
     d->gl.Finish();
@@ -301,8 +301,8 @@ static int op_run(struct patina_device *device, enum pt_kernel kernel, const voi
             .kernel = kernel, .arguments = arguments, .argument_size = argument_size, .buffers = buffers, .cancel = cancel});
 }
 
-// What pt_gl_finish_picture is made for; z comes from the keys, what else is extracted from planes that it does not make.
-static uint32_t op_finishes(const struct pt_bound_pass *passes, uint32_t count)
+// What pt_gl_run_tail is made for; z comes from the keys, what else is extracted from planes that it does not make.
+static uint32_t op_tail_length(const struct pt_bound_pass *passes, uint32_t count)
 {
     static const enum pt_kernel tail[] = {PT_KERNEL_smooth, PT_KERNEL_antialias, PT_KERNEL_compose};
     enum { TAIL = sizeof tail / sizeof *tail };
@@ -321,12 +321,12 @@ static uint32_t op_finishes(const struct pt_bound_pass *passes, uint32_t count)
     return shades + TAIL;
 }
 
-static int op_finish_picture(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
+static int op_run_tail(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
 {
-    return call(device, finish_picture, &(struct finish_call){.passes = passes, .count = count});
+    return call(device, run_tail, &(struct tail_call){.passes = passes, .count = count});
 }
 
-static int op_finish(struct patina_device *device) { return call(device, finish_work, NULL); }
+static int op_wait(struct patina_device *device) { return call(device, wait_for_work, NULL); }
 
 static void op_destroy(struct patina_device *device)
 {
@@ -347,9 +347,9 @@ static const struct pt_device_ops ops = {
     .buffer_read = op_buffer_read,
     .buffer_fill = op_buffer_fill,
     .run = op_run,
-    .finishes = op_finishes,
-    .finish_picture = op_finish_picture,
-    .finish = op_finish,
+    .tail_length = op_tail_length,
+    .run_tail = op_run_tail,
+    .wait = op_wait,
 };
 
 int pt_device_gl_create(const patina_device_desc *desc, const char *context, struct patina_device **out)

@@ -22,7 +22,7 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_COUNTERS,
     PT_GL_SCRATCH_PIXELS, // fill: this step's changes; shade: filled pixels; antialias: edges; lines: steps
     PT_GL_SCRATCH_COLORS, // antialias: of edges; lines: discs
-    PT_GL_SCRATCH_SHADED, // finish: colours before they are smoothed
+    PT_GL_SCRATCH_SHADED, // lib/tail.glsl: colours before they are smoothed
     PT_GL_SCRATCH_SHOWN,  // shade: what pixels give to a wide blend of normals
     PT_GL_SCRATCH_SAVED,  // fill: pixels as they were before the phase
     PT_GL_SCRATCH_FILLED, // fill: a bit for each pixel filled in this phase
@@ -159,14 +159,14 @@ pt_gl_runner pt_gl_raster, pt_gl_scatter, pt_gl_splat, pt_gl_blend, pt_gl_averag
     pt_gl_fill, pt_gl_shade, pt_gl_antialias, pt_gl_push, pt_gl_lines, pt_gl_gather, pt_gl_soft;
 int pt_gl_points_of(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t variant);
 // The picture from what is shaded: smooth, antialias and compose at once, whose passes these are.
-int pt_gl_finish(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded);
+int pt_gl_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded);
 // The coarse cells over the rectangle of a push.
 struct view_args pt_gl_coarse_view(const struct push_args *args);
 
 // kernels.c
 int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work);
 // shade, of any number of instances, smooth, antialias and compose, without the planes between them.
-int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count);
+int pt_gl_run_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count);
 
 // selftest.c
 // Whether 64-bit atomics of this driver give what the CPU says; 0 too where the driver has none.

@@ -168,7 +168,7 @@ int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work)
     return runners[work->kernel] ? runners[work->kernel](d, work) : run_once(d, work);
 }
 
-int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count)
+int pt_gl_run_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count)
 {
     const struct pt_bound_pass *tail = passes + count - 3;
     const struct view_args *view = tail->arguments;
@@ -183,5 +183,5 @@ int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *pas
                                                    .argument_size = sizeof(struct shade_args),
                                                    .buffers = shade->buffers});
     }
-    return result == PATINA_OK ? pt_gl_finish(d, tail, &shaded) : result;
+    return result == PATINA_OK ? pt_gl_tail(d, tail, &shaded) : result;
 }

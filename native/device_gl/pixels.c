@@ -190,27 +190,27 @@ int pt_gl_antialias(struct pt_gl_device *d, const struct pt_gl_work *work)
     return result;
 }
 
-// ---- finish ----------------------------------------------------------------------------------------------------
+// ---- smooth, antialias and compose as one -----------------------------------------------------------------
 
-enum { FINISH = 1 }; // among compose's programs: two steps, and two where lines are drawn
+enum { TAIL = 1 }; // among compose's programs: two steps, and two where lines are drawn
 
-// Of smooth, antialias and compose, as lib/finish.glsl reads them.
-struct finish_args {
+// Of smooth, antialias and compose, as lib/tail.glsl reads them.
+struct tail_args {
     struct smooth_args smooth;
     struct antialias_args antialias;
     struct compose_args compose;
 };
 
-static int bind_finish(struct pt_gl_device *d, const struct finish_args *args, const struct pt_bound_pass *passes,
-                       const struct pt_buffer *shaded)
+static int bind_tail(struct pt_gl_device *d, const struct tail_args *args, const struct pt_bound_pass *passes,
+                     const struct pt_buffer *shaded)
 {
     struct pt_buffer *const *planes = passes[0].buffers; // of smooth
     const struct pt_buffer *combined = passes[2].buffers[PT_BUF_compose_combined];
     const struct pt_buffer *line = args->antialias.inked ? passes[1].buffers[PT_BUF_antialias_line] : combined;
     pt_gl_arguments(d, args, sizeof *args);
-    int result = pt_gl_bind(d, PT_BIND_finish_combined, combined->name, 0, combined->size, "finish");
+    int result = pt_gl_bind(d, PT_BIND_tail_combined, combined->name, 0, combined->size, "tail");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, PT_BIND_finish_line, line->name, 0, line->size, "finish");
+        result = pt_gl_bind(d, PT_BIND_tail_line, line->name, 0, line->size, "tail");
     if (result == PATINA_OK)
         result = pt_gl_bind_texture(d, PT_UNIT_key, planes[PT_BUF_smooth_keys]);
     if (result == PATINA_OK)
@@ -221,11 +221,11 @@ static int bind_finish(struct pt_gl_device *d, const struct finish_args *args, c
 }
 
 // What shows no point is background; the rest is smoothed into the picture, and then its edges.
-int pt_gl_finish(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded)
+int pt_gl_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded)
 {
-    const struct finish_args args = {*(const struct smooth_args *)passes[0].arguments,
-                                     *(const struct antialias_args *)passes[1].arguments,
-                                     *(const struct compose_args *)passes[2].arguments};
+    const struct tail_args args = {*(const struct smooth_args *)passes[0].arguments,
+                                   *(const struct antialias_args *)passes[1].arguments,
+                                   *(const struct compose_args *)passes[2].arguments};
     static const char *const definitions[] = {"#define STEP 0\n#define INKED 0\n", "#define STEP 1\n#define INKED 0\n",
                                               "#define STEP 0\n#define INKED 1\n", "#define STEP 1\n#define INKED 1\n"};
     const struct pt_buffer *combined = passes[2].buffers[PT_BUF_compose_combined];
@@ -238,15 +238,15 @@ int pt_gl_finish(struct pt_gl_device *d, const struct pt_bound_pass *passes, con
     if (result != PATINA_OK || !d->tiles.count[PT_GL_TILES_POINTS])
         return result;
     for (uint32_t i = find; i < find + 2 && result == PATINA_OK; i++)
-        if (!d->programs[PT_KERNEL_compose][FINISH + i])
-            result = pt_gl_program(d, "lib/finish.glsl", definitions[i], &d->programs[PT_KERNEL_compose][FINISH + i]);
+        if (!d->programs[PT_KERNEL_compose][TAIL + i])
+            result = pt_gl_program(d, "lib/tail.glsl", definitions[i], &d->programs[PT_KERNEL_compose][TAIL + i]);
     if (result == PATINA_OK)
-        result = bind_finish(d, &args, passes, shaded);
+        result = bind_tail(d, &args, passes, shaded);
     if (result == PATINA_OK)
-        result = prepare_list(d, PT_BIND_finish_counters, PT_BIND_finish_edges, TILE_PIXELS);
+        result = prepare_list(d, PT_BIND_tail_counters, PT_BIND_tail_edges, TILE_PIXELS);
     if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_compose, FINISH + find, PT_GL_TILES_POINTS);
-    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_compose, FINISH + find + 1, list_length(d), GROUP) : result;
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_compose, TAIL + find, PT_GL_TILES_POINTS);
+    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_compose, TAIL + find + 1, list_length(d), GROUP) : result;
 }
 
 // ---- push ------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ struct pt_builder {
     struct pt_plan *plan;
     uint32_t room;
     uint32_t layer;  // that passes are added for; 0: the whole picture
-    uint32_t finish; // first shading pass of the last layer planned
+    uint32_t tail;   // first shading pass of the last layer planned
     int behind;      // of a light's map, or where what stations looked through is drawn again: the limit plane holds
     int again;       // passes that were planned before: what is left out was said
     const char *as;  // what statistics add its passes to; NULL: their kernels' names

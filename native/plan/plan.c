@@ -599,7 +599,7 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     pt_plan_lines(builder);
     pt_plan_soft_layer(builder);
     plan_shadows(builder);
-    uint32_t finish = plan->pass_count;
+    uint32_t tail = plan->pass_count;
     for (int own = pt_effects_want_albedo(builder->scene); own >= 0; own--) { // normals are shown by the last
         enum pt_plane shaded = own ? PT_PLANE_UNLIT : PT_PLANE_COLOR_A;
         for (uint32_t i = 0; i < plan->instance_count; i++)
@@ -612,7 +612,7 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     enum pt_plane color = plan_image_filters(builder);
     if (plan->layers > 1)
         plan_peel(builder, color);
-    builder->finish = finish;
+    builder->tail = tail;
     return color;
 }
 
@@ -641,7 +641,7 @@ static void put_together(const struct pt_builder *builder)
     const patina_settings *settings = &builder->scene->settings;
     const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE |
                               1u << PATINA_PASS_SHADOW; // are taken from its planes, at the end
-    uint32_t first = builder->finish, end = first;
+    uint32_t first = builder->tail, end = first;
     int picture = 0, reads = 0;
     if (settings->layer_passes || plan->triangles || (plan->layers == 1 && plan->transparent) ||
         (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
@@ -658,7 +658,7 @@ static void put_together(const struct pt_builder *builder)
             reads = 0;
         }
     }
-    if (picture && (first == builder->finish || reads))
+    if (picture && (first == builder->tail || reads))
         plan->passes[first].together = end - first;
 }
 

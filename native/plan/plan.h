@@ -354,7 +354,7 @@ static inline size_t pt_plan_plane_bytes(const struct pt_plan *plan, enum pt_pla
 // Whether the picture that readers see has this plane.
 int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane);
 
-// lifetimes.c. How many passes from one on a device runs as one: device.h, finishes.
+// lifetimes.c. How many passes from one on a device runs as one: device.h, tail_length.
 typedef uint32_t pt_together(const void *device, const struct pt_pass *passes);
 // Finds plan->lives, and which of them share slabs; apart: none do, for all are to be looked at afterwards. together: NULL: every pass
 // runs alone. PATINA_ERROR_MEMORY, or 0.

@@ -63,14 +63,14 @@ uint32_t pt_passes_together(const void *of, const struct pt_pass *passes)
 {
     const struct patina_device *device = of;
     struct pt_bound_pass some[64]; // not bound yet
-    if (!passes->together || !device->ops->finish_picture ||
-        (device->ops->finishes && passes->together > sizeof some / sizeof *some))
+    if (!passes->together || !device->ops->run_tail ||
+        (device->ops->tail_length && passes->together > sizeof some / sizeof *some))
         return 0;
-    if (!device->ops->finishes)
+    if (!device->ops->tail_length)
         return passes->together;
     for (uint32_t i = 0; i < passes->together; i++)
         some[i] = (struct pt_bound_pass){.kernel = passes[i].kernel, .arguments = passes[i].arguments};
-    return device->ops->finishes(some, passes->together);
+    return device->ops->tail_length(some, passes->together);
 }
 
 static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
@@ -89,7 +89,7 @@ static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
             error = bind_between(&e->binder, &passes[i].refs[k], next++);
     }
     if (!error)
-        error = e->device->ops->finish_picture(e->device, bound, count);
+        error = e->device->ops->run_tail(e->device, bound, count);
     free(bound);
     free(buffers);
     return error;
@@ -122,14 +122,14 @@ int pt_run_passes(struct pt_execution *e, uint32_t first, uint32_t count)
     for (uint32_t i = first; i < end && !error;) {
         const struct pt_pass *pass = &e->plan->passes[i];
         const uint32_t some = pt_passes_together(e->device, pass), taken = some ? some : 1;
-        const char *name = taken > 1 ? "finish" : pass->name;
+        const char *name = taken > 1 ? "tail" : pass->name;
         error = run_some(e, i, taken);
         i += taken;
         if (error)
             break;
         if (i < end && e->plan->passes[i].name == name) // timed with it
             continue;
-        error = e->device->ops->finish(e->device); // so that a time is that of its work
+        error = e->device->ops->wait(e->device); // so that a time is that of its work
         const double now = pt_milliseconds();
         pt_note_time(e->times, name, now - before);
         before = now;

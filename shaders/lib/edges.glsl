@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What an edge is, and how much of its pixel it covers: a part of antialias and of finish. [D 3.5] With BEHIND, include it behind
+// What an edge is, and how much of its pixel it covers: a part of antialias and of tail.glsl. [D 3.5] With BEHIND, include it behind
 // a block that has float through[].
 #ifndef PT_EDGES_GLSL
 #define PT_EDGES_GLSL

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The 3 x 3 low-pass of one pixel: a part of smooth and of finish. [D 3.4, Table 1]
+// The 3 x 3 low-pass of one pixel: a part of smooth and of tail.glsl. [D 3.4, Table 1]
 #ifndef PT_SMOOTH_GLSL
 #define PT_SMOOTH_GLSL
 

@@ -290,7 +290,7 @@ static void test_statistics(void **state)
         assert_int_equal(stats.points, 1800);
         assert_true(stats.points_scattered <= stats.points && stats.chunks_culled <= stats.chunks);
         static const char *const always[] = {"scatter", "surface", "fill", "shade", "smooth", "antialias"};
-        const char *together = json_member(full, "passes", "finish"); // the passes from shading on, where they run as one
+        const char *together = json_member(full, "passes", "tail"); // the passes from shading on, where they run as one
         double sum = together ? strtod(together, NULL) : 0.0;
         for (uint32_t i = 0; i < (together ? 3 : sizeof always / sizeof always[0]); i++) {
             const char *value = json_member(full, "passes", always[i]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pointwise kernels over rows: by themselves (walk.c), or as steps of the fused tail (fused/finish.c).
+// Pointwise kernels over rows: by themselves (walk.c), or as steps of the fused tail (fused/tail.c).
 #ifndef PT_WALK_H
 #define PT_WALK_H
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the walk of finish.c knows, and where it is.
-#ifndef PT_FINISH_H
-#define PT_FINISH_H
+// What the walk of tail.c knows, and where it is.
+#ifndef PT_TAIL_H
+#define PT_TAIL_H
 
 #include "device_cpu/kernels/antialias.h"
 #include "device_cpu/kernels/extract.h"
@@ -18,7 +18,7 @@ struct steps { // passes that follow one another
     uint32_t first, count;
 };
 
-struct finish {
+struct tail {
     const struct pt_cpu_pass *passes;
     uint32_t shade_count;                   // of passes, from the first on
     struct steps before, after, last;       // pointwise: before smoothing, after it, on the picture
@@ -62,17 +62,17 @@ struct walk {
     struct pt_tile_sum *tiles; // of the row of tiles at hand
 };
 
-static struct pt_seen_row *seen_row(const struct finish *finish, struct walk *walk, int32_t y)
+static struct pt_seen_row *seen_row(const struct tail *tail, struct walk *walk, int32_t y)
 {
-    return &walk->seen[(uint32_t)(y + 4 * SEEN_MOST) % finish->ring];
+    return &walk->seen[(uint32_t)(y + 4 * SEEN_MOST) % tail->ring];
 }
 
 static uint32_t slot(int32_t y) { return (uint32_t)(y + RING) % RING; }
 
 // Whether a pass shades points with their own colours, for a step that asks for these.
-static int shades_albedo(const struct finish *finish, uint32_t i)
+static int shades_albedo(const struct tail *tail, uint32_t i)
 {
-    return finish->albedo && finish->passes[i].call.buffers[PT_BUF_shade_color] == finish->albedo;
+    return tail->albedo && tail->passes[i].call.buffers[PT_BUF_shade_color] == tail->albedo;
 }
 
 #endif

@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The walk's first steps: rows are seen, their points' colours fetched, their normals blended, and all is lit.
-#ifndef PT_FINISH_SHADE_H
-#define PT_FINISH_SHADE_H
+#ifndef PT_TAIL_SHADE_H
+#define PT_TAIL_SHADE_H
 
-#include "finish.h"
+#include "tail.h"
 
 // Colours and shadows of points are fetched at random. Of large clouds each is a miss of all caches: those of a row that is
 // shaded later are asked for (10M points: 4.4 ms in place of 6.3). Of others, so many bytes, none is far (1M: 2% slower).
 static int lies_far(const struct instance_args *instance, size_t size) { return size * instance->id_count > 6u << 20; }
 
-static void ask_for_colors(const struct finish *finish, const struct pt_seen_row *seen, int32_t y)
+static void ask_for_colors(const struct tail *tail, const struct pt_seen_row *seen, int32_t y)
 {
-    const struct view_args *view = finish->planes.view;
-    for (uint32_t i = 0; i < finish->shade_count; i++) {
-        const struct shade_args *args = finish->passes[i].call.arguments;
-        const char *colors = PT_DATA(&finish->passes[i].call, shade, colors);
+    const struct view_args *view = tail->planes.view;
+    for (uint32_t i = 0; i < tail->shade_count; i++) {
+        const struct shade_args *args = tail->passes[i].call.arguments;
+        const char *colors = PT_DATA(&tail->passes[i].call, shade, colors);
         const size_t bytes = pt_color_bytes[args->instance.color_format], size = lies_far(&args->instance, bytes) ? bytes : 0;
         const uint32_t *words[PT_MAX_LIGHTS];
         uint32_t casting = 0;
         for (uint32_t l = 0; l < args->light_count; l++)
             if (args->lights[l].shadow && !args->of_pixels) // those lie as the pixels do
-                words[casting++] = (const uint32_t *)PT_DATA(&finish->passes[i].call, shade, shadows) +
+                words[casting++] = (const uint32_t *)PT_DATA(&tail->passes[i].call, shade, shadows) +
                                    (size_t)(args->lights[l].shadow - 1) * args->instance.id_count;
         for (uint32_t x = seen->first; (size || casting) && x < seen->end; x += PT_LANES) {
             size_t at = (size_t)y * view->width + x;
             vi id;
-            vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, view->width), &id);
+            vm ours = pt_of_instance(tail->planes.keys + at, &args->instance, pt_lanes_left(x, view->width), &id);
             if (!vm_bits(ours))
                 continue;
             uint32_t points[PT_LANES]; // all of them, the first point where there is none: no branch depends on the pixels
@@ -39,34 +39,34 @@ static void ask_for_colors(const struct finish *finish, const struct pt_seen_row
     }
 }
 
-static void see(const struct finish *finish, struct walk *walk, int32_t y)
+static void see(const struct tail *tail, struct walk *walk, int32_t y)
 {
-    struct pt_seen_row *row = seen_row(finish, walk, y);
-    pt_see_row(&finish->planes, y, finish->reach ? PT_BLEND_FILLED : 1.0f, finish->with_normals, row);
-    ask_for_colors(finish, row, y);
+    struct pt_seen_row *row = seen_row(tail, walk, y);
+    pt_see_row(&tail->planes, y, tail->reach ? PT_BLEND_FILLED : 1.0f, tail->with_normals, row);
+    ask_for_colors(tail, row, y);
 }
 
-static void find_flat(const struct finish *finish, struct walk *walk, int32_t y)
+static void find_flat(const struct tail *tail, struct walk *walk, int32_t y)
 {
-    const struct pt_seen_row *const rows[3] = {seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
-                                               seen_row(finish, walk, y + 1)};
+    const struct pt_seen_row *const rows[3] = {seen_row(tail, walk, y - 1), seen_row(tail, walk, y),
+                                               seen_row(tail, walk, y + 1)};
     if (rows[1]->end)
-        pt_find_flat(rows, finish->planes.view->width);
+        pt_find_flat(rows, tail->planes.view->width);
 }
 
 // Opacity into the row's colours.
-static void make_translucent(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
+static void make_translucent(const struct tail *tail, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
                              const struct pt_color_row *row, float *opacities, int32_t y)
 {
     const struct shade_args *args = call->arguments;
-    const uint32_t width = finish->planes.view->width;
+    const uint32_t width = tail->planes.view->width;
     for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
         vi id;
-        vm ours = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
+        vm ours = pt_of_instance(tail->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
         if (!vm_bits(ours))
             continue;
         const size_t at = (size_t)y * width + x;
-        const vi source = pt_color_pixels(&args->instance, pt_source(&finish->planes, at), at);
+        const vi source = pt_color_pixels(&args->instance, pt_source(&tail->planes, at), at);
         vf opacity = pt_opacity(&args->instance, PT_DATA(call, shade, colors), PT_DATA(call, shade, opacities), id, source,
                                 ours);
         for (uint32_t k = 0; k < 3; k++)
@@ -76,53 +76,53 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
     }
 }
 
-static inline __attribute__((always_inline)) void light_row(const struct finish *finish, struct walk *walk,
+static inline __attribute__((always_inline)) void light_row(const struct tail *tail, struct walk *walk,
                                                             const struct pt_cpu_call *call, int32_t y, int plain)
 {
     const struct shade_args *args = call->arguments;
     const uint32_t *shadows = PT_DATA(call, shade, shadows);
-    const struct view_args *view = finish->planes.view;
+    const struct view_args *view = tail->planes.view;
     const struct pt_color_row *out = &walk->shaded[slot(y)];
     const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
     const int reach = (int)args->blend;
     for (int32_t k = -reach; k <= reach; k++)
-        around[reach + k] = seen_row(finish, walk, y + k);
+        around[reach + k] = seen_row(tail, walk, y + k);
     const uint8_t *one_layer = reach == 1 ? around[reach]->flat : walk->wide;
     for (uint32_t x = around[reach]->first; x < around[reach]->end; x += PT_LANES) {
         vf color[3] = {vf_load(out->color[0] + x), vf_load(out->color[1] + x), vf_load(out->color[2] + x)}, normal[3];
         vi id;
-        vm ours = pt_of_instance(finish->planes.keys + (size_t)y * view->width + x, &args->instance,
+        vm ours = pt_of_instance(tail->planes.keys + (size_t)y * view->width + x, &args->instance,
                                  pt_lanes_left(x, view->width), &id);
         if (!vm_bits(ours))
             continue;
-        float *const *blended = reach && reach == finish->reach && one_layer[x / PT_LANES] ? walk->blended : NULL;
-        vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, blended, shadows, x, (uint32_t)y, id, ours,
+        float *const *blended = reach && reach == tail->reach && one_layer[x / PT_LANES] ? walk->blended : NULL;
+        vf share = pt_shade_pixels(args, &tail->planes, around, tail->weights, blended, shadows, x, (uint32_t)y, id, ours,
                                    plain, color, normal);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(out->color[k] + x, color[k], ours);
-        for (uint32_t k = 0; k < 3 && finish->shows_normals; k++)
+        for (uint32_t k = 0; k < 3 && tail->shows_normals; k++)
             vf_store_where(walk->shown[slot(y)][k] + x, normal[k], ours);
-        if (finish->extract && finish->extract->shadow)
+        if (tail->extract && tail->extract->shadow)
             vf_store_where(walk->shown[slot(y)][4] + x, share, ours);
     }
 }
 
-static void shade_lit(const struct finish *finish, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
+static void shade_lit(const struct tail *tail, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
 {
     if (pt_plain(call->arguments))
-        light_row(finish, walk, call, y, 1);
+        light_row(tail, walk, call, y, 1);
     else
-        light_row(finish, walk, call, y, 0);
+        light_row(tail, walk, call, y, 0);
 }
 
 // Colours of three bytes a point, fetched at random: a loop of plain loads does nothing else, so that many are under way at a
 // time.
-static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
+static void fetch_bytes(const struct tail *tail, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
                         const struct pt_color_row *out, int32_t y)
 {
     enum { BLOCK = 16 };
     const struct shade_args *args = call->arguments;
-    const uint32_t width = finish->planes.view->width;
+    const uint32_t width = tail->planes.view->width;
     const uint8_t *colors = PT_DATA(call, shade, colors);
     for (uint32_t first = seen->first; first < seen->end; first += BLOCK * PT_LANES) {
         uint32_t words[BLOCK * PT_LANES];
@@ -132,8 +132,7 @@ static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *c
         for (uint32_t i = 0; i < count; i++) {
             vi id;
             uint32_t x = first + i * PT_LANES;
-            ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width),
-                                     &id);
+            ours[i] = pt_of_instance(tail->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
             vi_store(words + i * PT_LANES, vi_select(ours[i], id, vi_set(0)));
         }
         for (uint32_t i = 0; i < count * PT_LANES; i++)
@@ -150,19 +149,19 @@ static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *c
 }
 
 // Any others, and those that a ramp or grading changes.
-static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
+static void fetch_colors(const struct tail *tail, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
                          const struct pt_color_row *out, int32_t y)
 {
     const struct shade_args *args = call->arguments;
-    const uint32_t width = finish->planes.view->width;
+    const uint32_t width = tail->planes.view->width;
     for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
         const size_t at = (size_t)y * width + x;
         vf albedo[3];
         vi id;
-        vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, width), &id);
+        vm ours = pt_of_instance(tail->planes.keys + at, &args->instance, pt_lanes_left(x, width), &id);
         if (!vm_bits(ours))
             continue;
-        const vi source = pt_color_pixels(&args->instance, pt_source(&finish->planes, at), at);
+        const vi source = pt_color_pixels(&args->instance, pt_source(&tail->planes, at), at);
         pt_albedo(&args->instance, PT_DATA(call, shade, colors), id, source, ours, albedo);
         if (pt_recolors(args))
             pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
@@ -171,14 +170,14 @@ static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *
     }
 }
 
-static void fetch(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
+static void fetch(const struct tail *tail, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
                   const struct pt_color_row *out, int32_t y)
 {
     const struct shade_args *args = call->arguments;
     if (pt_gathers_bytes(&args->instance) && !pt_recolors(args))
-        fetch_bytes(finish, call, seen, out, y);
+        fetch_bytes(tail, call, seen, out, y);
     else
-        fetch_colors(finish, call, seen, out, y);
+        fetch_colors(tail, call, seen, out, y);
 }
 
 // Where the row's next part that is flat, or is not, ends.
@@ -191,11 +190,11 @@ static uint32_t end_of_part(const struct pt_seen_row *seen, uint32_t x)
 }
 
 // Sums of normals wherever the blend's whole window is one layer.
-static void blend_nine(const struct finish *finish, struct walk *walk, int32_t y)
+static void blend_nine(const struct tail *tail, struct walk *walk, int32_t y)
 {
-    const struct pt_seen_row *const rows[3] = {seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
-                                               seen_row(finish, walk, y + 1)};
-    const struct pt_nine nine = pt_blend_nine(finish->weights);
+    const struct pt_seen_row *const rows[3] = {seen_row(tail, walk, y - 1), seen_row(tail, walk, y),
+                                               seen_row(tail, walk, y + 1)};
+    const struct pt_nine nine = pt_blend_nine(tail->weights);
     for (uint32_t x = rows[1]->first, end; x < rows[1]->end; x = end) {
         end = end_of_part(rows[1], x);
         for (uint32_t k = 0; k < 3 && pt_flat(rows[1], x); k++) {
@@ -206,104 +205,104 @@ static void blend_nine(const struct finish *finish, struct walk *walk, int32_t y
     }
 }
 
-static void blend_wide(const struct finish *finish, struct walk *walk, int32_t y)
+static void blend_wide(const struct tail *tail, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
-    const struct pt_blend blend = {finish->planes.view, finish->reach, finish->weights, around};
-    const int32_t end = (int32_t)seen_row(finish, walk, y)->end;
-    for (int32_t k = -finish->reach; k <= finish->reach; k++)
-        around[finish->reach + k] = seen_row(finish, walk, y + k);
-    for (int32_t x = (int32_t)seen_row(finish, walk, y)->first; x < end; x += PT_BLEND_COLUMNS)
+    const struct pt_blend blend = {tail->planes.view, tail->reach, tail->weights, around};
+    const int32_t end = (int32_t)seen_row(tail, walk, y)->end;
+    for (int32_t k = -tail->reach; k <= tail->reach; k++)
+        around[tail->reach + k] = seen_row(tail, walk, y + k);
+    for (int32_t x = (int32_t)seen_row(tail, walk, y)->first; x < end; x += PT_BLEND_COLUMNS)
         pt_blend_flat(&blend, x, x + PT_BLEND_COLUMNS < end ? x + PT_BLEND_COLUMNS : end, walk->wide, walk->blended);
 }
 
 // Colours without light, for steps that ask for them.
-static void fetch_albedo(const struct finish *finish, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
+static void fetch_albedo(const struct tail *tail, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
 {
-    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
     float *const *rows = walk->albedo[slot(y)];
     const struct pt_color_row out = {seen->z, {rows[0], rows[1], rows[2], walk->shaded[slot(y)].color[3]}};
-    fetch(finish, call, seen, &out, y);
-    if (finish->channels == 4)
-        make_translucent(finish, call, seen, &out, walk->shown[slot(y)][3], y);
+    fetch(tail, call, seen, &out, y);
+    if (tail->channels == 4)
+        make_translucent(tail, call, seen, &out, walk->shown[slot(y)][3], y);
 }
 
 // Of a picture that was shaded before: what others left in planes.
-static void load_shaded(const struct finish *finish, struct walk *walk, int32_t y)
+static void load_shaded(const struct tail *tail, struct walk *walk, int32_t y)
 {
-    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
     const struct pt_color_row *out = &walk->shaded[slot(y)];
     float *const *shown = walk->shown[slot(y)];
     for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
-        const size_t at = (size_t)y * finish->planes.view->width + x;
+        const size_t at = (size_t)y * tail->planes.view->width + x;
         vf four[4];
-        vf_load4(finish->colors + 4 * at, four);
+        vf_load4(tail->colors + 4 * at, four);
         for (uint32_t k = 0; k < 4; k++)
             vf_store(out->color[k] + x, four[k]);
-        if (finish->shading) {
-            vf_load4(finish->shading + 4 * at, four);
+        if (tail->shading) {
+            vf_load4(tail->shading + 4 * at, four);
             for (uint32_t k = 0; k < 4; k++)
                 vf_store(shown[k] + x, four[k]);
         }
-        if (finish->arrived)
-            vf_store(shown[4] + x, vf_load(finish->arrived + at));
+        if (tail->arrived)
+            vf_store(shown[4] + x, vf_load(tail->arrived + at));
     }
 }
 
 // Steps on a row of colours.
-static void take_steps(const struct finish *finish, struct walk *walk, const struct steps *steps,
-                       const struct pt_color_row *colors, int32_t y)
+static void take_steps(const struct tail *tail, struct walk *walk, const struct steps *steps, const struct pt_color_row *colors,
+                       int32_t y)
 {
-    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
     for (uint32_t i = steps->first; i < steps->first + steps->count && seen->end; i++) {
-        const struct pt_cpu_call *call = &finish->passes[i].call;
-        const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[finish->passes[i].kernel];
-        const size_t at = (size_t)y * finish->planes.view->width;
+        const struct pt_cpu_call *call = &tail->passes[i].call;
+        const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[tail->passes[i].kernel];
+        const size_t at = (size_t)y * tail->planes.view->width;
         struct pt_walk_row row = {.args = call->arguments,
                                   .clips = kernel->clips < 0 ? NULL : pt_cpu_data(call, (uint32_t)kernel->clips),
                                   .y = (uint32_t)y,
                                   .first = seen->first,
                                   .end = seen->end,
-                                  .keys = finish->planes.keys + at,
+                                  .keys = tail->planes.keys + at,
                                   .z = seen->z};
-        if (kernel->shading >= 0 && !finish->shade_count)
+        if (kernel->shading >= 0 && !tail->shade_count)
             row.shading = (const float *)pt_cpu_data(call, (uint32_t)kernel->shading) + 4 * at;
-        if (kernel->albedo >= 0 && !finish->shade_count)
+        if (kernel->albedo >= 0 && !tail->shade_count)
             row.albedo = (const float *)pt_cpu_data(call, (uint32_t)kernel->albedo) + 4 * at;
         for (uint32_t k = 0; k < 3; k++) {
             row.normal_rows[k] = walk->shown[slot(y)][k];
             row.albedo_rows[k] = walk->albedo[slot(y)][k];
             row.color_rows[k] = colors->color[k];
         }
-        row.color_rows[3] = finish->channels == 4 ? colors->color[3] : NULL;
+        row.color_rows[3] = tail->channels == 4 ? colors->color[3] : NULL;
         kernel->step(&row);
     }
 }
 
-static void shade(const struct finish *finish, struct walk *walk, int32_t y)
+static void shade(const struct tail *tail, struct walk *walk, int32_t y)
 {
-    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
     struct pt_color_row *out = &walk->shaded[slot(y)];
     out->z = seen->z;
-    if (finish->with_normals && finish->reach == 1 && seen->end)
-        blend_nine(finish, walk, y);
-    else if (finish->with_normals && finish->reach && seen->end)
-        blend_wide(finish, walk, y);
-    for (uint32_t i = 0; i < finish->shade_count && seen->end; i++) {
-        const struct pt_cpu_call *call = &finish->passes[i].call;
-        if (shades_albedo(finish, i)) {
-            fetch_albedo(finish, walk, call, y);
+    if (tail->with_normals && tail->reach == 1 && seen->end)
+        blend_nine(tail, walk, y);
+    else if (tail->with_normals && tail->reach && seen->end)
+        blend_wide(tail, walk, y);
+    for (uint32_t i = 0; i < tail->shade_count && seen->end; i++) {
+        const struct pt_cpu_call *call = &tail->passes[i].call;
+        if (shades_albedo(tail, i)) {
+            fetch_albedo(tail, walk, call, y);
             continue;
         }
-        fetch(finish, call, seen, out, y);
-        if (finish->with_normals)
-            shade_lit(finish, walk, call, y);
-        if (finish->channels == 4)
-            make_translucent(finish, call, seen, out, walk->shown[slot(y)][3], y);
+        fetch(tail, call, seen, out, y);
+        if (tail->with_normals)
+            shade_lit(tail, walk, call, y);
+        if (tail->channels == 4)
+            make_translucent(tail, call, seen, out, walk->shown[slot(y)][3], y);
     }
-    if (finish->colors && seen->end)
-        load_shaded(finish, walk, y);
-    take_steps(finish, walk, &finish->before, out, y);
+    if (tail->colors && seen->end)
+        load_shaded(tail, walk, y);
+    take_steps(tail, walk, &tail->before, out, y);
 }
 
 #endif

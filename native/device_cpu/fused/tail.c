@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// tail: shade, smooth, antialias, then peel or compose and extract as one walk over rows, with the pointwise kernels that the plan
+// has between and behind them. The planes between them stay in rings of rows that the second-level cache holds: nothing but the
+// picture, or what peeling hands on, is written. Same functions, same numbers as the kernels. It begins with shading, or behind a
+// kernel that is none of these with the colours that this left.
+// Where nothing is peeled the scene is opaque: alpha is 1 but for edges.
+#include "tail_shade.h"
+#include "device_cpu/pointwise/bodies.h"
+
+static void lay_out(const struct tail *tail, uint32_t thread, struct walk *walk)
+{
+    float *at = tail->memory + thread * tail->thread_floats + PT_ROW_PAD;
+    const size_t s = tail->stride;
+    for (uint32_t i = 0; i < tail->ring; i++, at += CHANNELS_SEEN * s)
+        walk->seen[i] = (struct pt_seen_row){at, at + s, {at + 2 * s, at + 3 * s, at + 4 * s}, (uint8_t *)(at + 5 * s), 0, 0};
+    for (uint32_t i = 0; i < RING; i++, at += CHANNELS_COLOR * s) {
+        walk->shaded[i] = (struct pt_color_row){NULL, {at, at + s, at + 2 * s, at + 3 * s}};
+        walk->smoothed[i] = (struct pt_color_row){NULL, {at + 4 * s, at + 5 * s, at + 6 * s, at + 7 * s}};
+        for (uint32_t k = 0; k < 5; k++)
+            walk->shown[i][k] = at + (8 + k) * s;
+        for (uint32_t k = 0; k < 3; k++)
+            walk->albedo[i][k] = at + (13 + k) * s;
+    }
+    for (uint32_t k = 0; k < 3; k++)
+        walk->blended[k] = at + k * s;
+    walk->wide = (uint8_t *)(at + 3 * s);
+}
+
+// ---- smoothing -------------------------------------------------------------------------------------------------------------
+
+static void smooth(const struct tail *tail, struct walk *walk, int32_t y)
+{
+    const struct pt_color_row *const rows[3] = {&walk->shaded[slot(y - 1)], &walk->shaded[slot(y)], &walk->shaded[slot(y + 1)]};
+    struct pt_color_row *out = &walk->smoothed[slot(y)];
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    out->z = rows[1]->z;
+    const vf scale = vf_set(pt_smooth_scale(tail->smooth));
+    const struct pt_nine nine = pt_smooth_weights(tail->smooth);
+    for (uint32_t x = seen->first, end; x < seen->end; x = end) {
+        const int flat = pt_flat(seen, x);
+        end = flat ? end_of_part(seen, x) : x + PT_LANES;
+        for (int k = 0; k < tail->channels && flat; k++) {
+            const float *const colors[3] = {rows[0]->color[k], rows[1]->color[k], rows[2]->color[k]};
+            pt_nine_flat(&nine, colors, (int32_t)x, (int32_t)end, scale, vf_set(k < 3 ? pt_float(PT_KEY_EMPTY_Z) : 1.0f),
+                         out->color[k]);
+        }
+        vm some = vf_lt(vf_load(out->z + x), empty); // +inf behind the row's end
+        vf color[4];
+        if (flat || !vm_bits(some))
+            continue;
+        if (tail->channels == 3)
+            pt_smooth_pixels(tail->smooth, rows, 3, x, vf_load(seen->limit + x), some, color);
+        else
+            pt_smooth_pixels(tail->smooth, rows, 4, x, vf_load(seen->limit + x), some, color);
+        for (int k = 0; k < tail->channels; k++)
+            vf_store(out->color[k] + x, color[k]);
+    }
+}
+
+static void draw(const struct tail *tail, struct walk *walk, int32_t y)
+{
+    if (tail->smooth)
+        smooth(tail, walk, y);
+    else
+        walk->smoothed[slot(y)] = walk->shaded[slot(y)];
+    take_steps(tail, walk, &tail->after, &walk->smoothed[slot(y)], y);
+}
+
+// ---- the picture ----------------------------------------------------------------------------------------------------------
+
+struct around { // rows y - 1, y, y + 1
+    const struct pt_color_row *row[3];
+};
+
+// Mixes the colours of those of PT_LANES pixels that are edges; returns which.
+static vm mix_edges(const struct tail *tail, const struct around *around, const float *limits, uint32_t x, uint32_t y, vm some,
+                    vf color[4])
+{
+    const struct view_args *view = tail->planes.view;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), one = vf_set(1.0f);
+    vf limit = empty, sum[4] = {vf_zero(), vf_zero(), vf_zero(), vf_zero()}, count = vf_zero();
+    if (tail->line)
+        some = vm_and(some, vm_not(vf_lt(vf_zero(), vf_load(tail->line + (size_t)y * view->width + x))));
+    if (tail->antialias->layers)
+        limit = vf_load(around->row[1]->z + x) + vf_load(limits + x);
+    for (int d = 0; d < 4; d++) {
+        const struct pt_color_row *row = around->row[1 + pt_cross[d][1]];
+        const uint32_t qx = x + (uint32_t)pt_cross[d][0];
+        vf z = vf_load(row->z + (int32_t)qx);
+        vm far = vm_and(some, vm_or(vf_lt(limit, z), vf_le(empty, z)));
+        if (y + (uint32_t)pt_cross[d][1] >= view->height || !vm_bits(far))
+            continue; // beyond the plane all is unknown: no edge
+        far = vm_and(far, vi_lt_unsigned(vi_add(vi_set(qx), vi_lanes()), vi_set(view->width)));
+        if (tail->through) { // where no pixel shows, peeling leaves what comes through as it is
+            vi at = vi_add(vi_set((y + (uint32_t)pt_cross[d][1]) * view->width + qx), vi_lanes());
+            vm hidden = vf_lt(vf_gather(tail->through, at, far), vf_set(PT_SPENT));
+            far = vm_and(far, vm_not(vm_and(hidden, vf_le(empty, z))));
+        }
+        count = vf_add_where(far, count, one);
+        far = vm_and(far, vf_lt(z, empty));
+        for (uint32_t k = 0; k < 3; k++)
+            sum[k] = vf_add_where(far, sum[k], vf_load(row->color[k] + (int32_t)qx));
+        sum[3] = vf_add_where(far, sum[3], tail->channels == 4 ? vf_load(row->color[3] + (int32_t)qx) : one);
+    }
+    vm edges = vf_lt(vf_zero(), count);
+    if (!vm_bits(edges))
+        return edges;
+    vf mixed[4];
+    pt_mix_edges(color, sum, vf_select(edges, count, one), mixed);
+    for (uint32_t k = 0; k < 4; k++)
+        color[k] = vf_select(edges, mixed[k], color[k]);
+    return edges;
+}
+
+// The passes beside the colour. (x, y): of the picture.
+static void put_passes(const struct tail *tail, const struct walk *walk, vf z, vm some, vm mixed, uint32_t x, uint32_t y,
+                       uint32_t count)
+{
+    const struct extract_args *args = tail->extract;
+    const uint32_t width = tail->planes.view->width, px = args->crop_x + x, py = args->crop_y + y;
+    size_t out = (size_t)y * args->crop_width + x;
+    if (args->depth && args->centered) {
+        const size_t at = (size_t)py * width + px;
+        vf_put(tail->depth + out,
+               pt_centered_depth(args, tail->planes.keys + at, tail->offsets, pt_source_of(tail->planes.from, at), some),
+               count);
+    } else if (args->depth) {
+        vf_put(tail->depth + out, z, count);
+    }
+    if (args->normal) {
+        vf normal[3], world[3] = {vf_zero(), vf_zero(), vf_zero()};
+        if (vm_bits(some)) {
+            for (uint32_t k = 0; k < 3; k++)
+                normal[k] = vf_load(walk->shown[slot((int32_t)py)][k] + px);
+            pt_world_normal(args->world_from_view, normal, some, world);
+        }
+        vf_put3(tail->normals + 3 * out, world, count);
+    }
+    if (args->source) {
+        vf value = vf_zero();
+        const size_t at = (size_t)py * width + px;
+        const vi source = vm_bits(some) ? pt_source(&tail->planes, at) : vi_set(0);
+        if (vm_bits(some) && args->discs_count)
+            value = pt_source_among_discs(args, tail->planes.keys + at, tail->away + at, source, mixed, some, px, py);
+        else if (vm_bits(some))
+            value = pt_source_value(width, source, mixed, some, px, py);
+        vf_put(tail->source + out, value, count);
+    }
+    if (args->shadow) {
+        vf value = vf_set(1.0f);
+        if ((tail->with_normals || tail->arrived) && vm_bits(some))
+            value = vf_select(some, vf_load(walk->shown[slot((int32_t)py)][4] + px), value);
+        vf_put(tail->shadow + out, value, count);
+    }
+}
+
+static void put_row(const struct tail *tail, struct walk *walk, int32_t y)
+{
+    const struct compose_args *args = tail->compose;
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
+    const struct around around = {{&walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)]}};
+    const uint32_t row = (uint32_t)y - args->crop_y;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    float *combined = tail->combined + 4 * (size_t)row * args->crop_width;
+    vf background[4];
+    for (int k = 0; k < 4; k++)
+        background[k] = vf_set(args->background[k]);
+    for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
+        uint32_t px = args->crop_x + x, count = pt_lanes_left(x, args->crop_width);
+        vf z = vf_load(seen->z + px), color[4] = {background[0], background[1], background[2], background[3]};
+        vm some = vm_and(vm_first(count), vf_lt(z, empty)), mixed = vm_of_bits(0);
+        if (vm_bits(some)) {
+            vf shown[4] = {vf_load(around.row[1]->color[0] + px), vf_load(around.row[1]->color[1] + px),
+                           vf_load(around.row[1]->color[2] + px), vf_set(1.0f)};
+            if (pt_flat(seen, px)) { // opaque, and no edge
+                memcpy(color, shown, sizeof color);
+            } else {
+                if (tail->antialias)
+                    mixed = mix_edges(tail, &around, seen->limit, px, (uint32_t)y, some, shown);
+                const struct pt_here here = {.some = some};
+                pt_compose(args, &here, shown);
+                memcpy(color, shown, sizeof color);
+            }
+        }
+        vf_put4(combined + 4 * (size_t)x, color, count);
+        if (tail->extract)
+            put_passes(tail, walk, z, some, mixed, x, row, count);
+    }
+    for (uint32_t i = tail->last.first; i < tail->last.first + tail->last.count; i++)
+        PT_POINTWISE_KERNELS[tail->passes[i].kernel].step(&(struct pt_walk_row){
+            .args = tail->passes[i].call.arguments, .y = row, .end = args->crop_width, .color = combined});
+}
+
+// ---- or what is peeled ---------------------------------------------------------------------------------------------------
+
+static void peel_row(const struct tail *tail, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
+    const struct around around = {{&walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)]}};
+    const uint32_t *rect = tail->peel->view.rect, first = rect[0] / PT_TILE, width = tail->planes.view->width;
+    const uint32_t columns = (width + PT_TILE - 1) / PT_TILE, last = (rect[2] + PT_TILE - 1) / PT_TILE;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    for (uint32_t tx = first; tx < last && y % PT_TILE == 0; tx++)
+        walk->tiles[tx] = pt_tile_begin();
+    for (uint32_t x = first * PT_TILE; x < rect[2]; x += PT_LANES) {
+        vm lanes = vm_first(pt_lanes_left(x, rect[2]));
+        vf z = vf_load(seen->z + x), color[4] = {empty, empty, empty, empty};
+        vm some = vm_and(lanes, vf_lt(z, empty));
+        if (vm_bits(some)) {
+            for (uint32_t k = 0; k < 4; k++)
+                color[k] = vf_load(around.row[1]->color[k] + x);
+            if (tail->antialias && !pt_flat(seen, x))
+                mix_edges(tail, &around, seen->limit, x, (uint32_t)y, some, color);
+        }
+        // keys of what was filled across a layer already taken stay: nothing reads them any more
+        pt_peel_pixels(tail->peel, &tail->peeled, (size_t)y * width + x, lanes, some, z, color,
+                       vf_load(walk->shown[slot(y)][3] + x), vf_load(seen->limit + x), &walk->tiles[x / PT_TILE]);
+    }
+    if (y % PT_TILE != PT_TILE - 1 && y != tail->end - 1)
+        return;
+    for (uint32_t tx = first; tx < last; tx++)
+        tail->tiles[(size_t)(y / PT_TILE) * columns + tx] = pt_tile_end(&walk->tiles[tx]);
+}
+
+// ---- the walk ----------------------------------------------------------------------------------------------------------------
+
+static void tail_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct tail *tail = context;
+    struct walk *walk = &tail->walks[thread];
+    const int32_t reach = tail->reach, first = tail->base + (int32_t)(begin * UNIT);
+    int32_t last = tail->base + (int32_t)(end * UNIT);
+    last = last < tail->end ? last : tail->end;
+    int32_t y = first;
+    if (first != walk->next) { // not where this thread stopped: begin anew
+        walk->first = first;
+        y = first - 4 - 2 * reach;
+    }
+    for (; y < last; y++) { // y is finished when y + 2 + reach has been seen
+        see(tail, walk, y + 2 + reach);
+        find_flat(tail, walk, y + 1 + reach);
+        if (y + 2 >= walk->first - 2)
+            shade(tail, walk, y + 2);
+        if (y + 1 >= walk->first - 1)
+            draw(tail, walk, y + 1);
+        if (y >= walk->first && tail->peel)
+            peel_row(tail, walk, y);
+        else if (y >= walk->first)
+            put_row(tail, walk, y);
+    }
+    walk->next = last;
+}
+
+// What a pointwise pass asks for.
+static void add_step(struct tail *tail, uint32_t i)
+{
+    const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[tail->passes[i].kernel];
+    struct steps *steps = tail->compose || tail->peel ? &tail->last : tail->smooth ? &tail->after : &tail->before;
+    if (!steps->count++)
+        steps->first = i;
+    tail->shows_normals |= kernel->shading >= 0;
+    if (kernel->albedo >= 0)
+        tail->albedo = tail->passes[i].call.buffers[kernel->albedo];
+    if (!tail->shade_count && !tail->colors && steps != &tail->last)
+        tail->colors = pt_cpu_data(&tail->passes[i].call, (uint32_t)kernel->color);
+}
+
+// Where nothing is shaded: smoothing and anti-aliasing say what pixels show.
+_Static_assert((int)PT_BUF_smooth_from == (int)PT_BUF_antialias_from && (int)PT_BUF_smooth_deff == (int)PT_BUF_antialias_deff &&
+                   (int)PT_BUF_smooth_color == (int)PT_BUF_antialias_color,
+               "smooth and antialias list what they read alike");
+static void take_planes(struct tail *tail, const struct pt_cpu_call *call)
+{
+    if (tail->shade_count)
+        return;
+    tail->planes.from = PT_DATA(call, smooth, from);
+    tail->planes.deff = PT_DATA(call, smooth, deff);
+    if (!tail->colors)
+        tail->colors = PT_DATA(call, smooth, color);
+}
+
+int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
+{
+    struct tail tail = {.passes = passes};
+    const struct pt_cpu_call *shared = &passes[0].call;
+    for (uint32_t i = 0; i < count; i++) {
+        const struct pt_cpu_call *call = &passes[i].call;
+        switch (passes[i].kernel) {
+        case PT_KERNEL_shade:
+            tail.shade_count++;
+            tail.with_normals |= (int)((const struct shade_args *)call->arguments)->instance.lit;
+            if (tail.reach < (int32_t)((const struct shade_args *)call->arguments)->blend)
+                tail.reach = (int32_t)((const struct shade_args *)call->arguments)->blend;
+            tail.planes.normals = PT_DATA(call, shade, normal);
+            tail.planes.deff = PT_DATA(call, shade, deff);
+            break;
+        case PT_KERNEL_smooth:
+            take_planes(&tail, call);
+            tail.smooth = call->arguments;
+            break;
+        case PT_KERNEL_antialias:
+            take_planes(&tail, call);
+            tail.antialias = call->arguments;
+            tail.through = tail.antialias->behind ? PT_DATA(call, antialias, through) : NULL;
+            tail.line = tail.antialias->inked ? PT_DATA(call, antialias, line) : NULL;
+            break;
+        case PT_KERNEL_peel:
+            tail.peel = call->arguments;
+            tail.shading = PT_DATA(call, peel, shading);
+            tail.planes.keys = PT_DATA(call, peel, keys);
+            tail.planes.view = &tail.peel->view;
+            tail.peeled = (struct pt_peeled){PT_DATA(call, peel, limit), PT_DATA(call, peel, through),
+                                             PT_DATA(call, peel, over)};
+            tail.tiles = PT_DATA(call, peel, tiles);
+            tail.base = (int32_t)(tail.peel->view.rect[1] / PT_TILE * PT_TILE);
+            tail.end = (int32_t)tail.peel->view.rect[3];
+            break;
+        case PT_KERNEL_compose:
+            tail.compose = call->arguments;
+            tail.planes.keys = PT_DATA(call, compose, keys);
+            tail.combined = PT_DATA(call, compose, combined);
+            tail.planes.view = &tail.compose->view;
+            tail.base = (int32_t)tail.compose->crop_y;
+            tail.end = tail.base + (int32_t)tail.compose->crop_height;
+            break;
+        case PT_KERNEL_extract:
+            tail.extract = call->arguments;
+            tail.shows_normals |= (int)tail.extract->normal;
+            tail.shading = tail.extract->normal ? PT_DATA(call, extract, shading) : NULL;
+            tail.arrived = tail.extract->shadow ? PT_DATA(call, extract, arrived) : NULL;
+            if (!tail.planes.from) // smoothing's, where nothing is shaded: extract has it for some passes alone
+                tail.planes.from = PT_DATA(call, extract, from);
+            tail.depth = PT_DATA(call, extract, depth);
+            tail.normals = PT_DATA(call, extract, normal);
+            tail.source = PT_DATA(call, extract, source);
+            tail.shadow = PT_DATA(call, extract, shadow);
+            tail.away = PT_DATA(call, extract, away);
+            tail.offsets = PT_DATA(call, extract, offset);
+            break;
+        default: add_step(&tail, i);
+        }
+    }
+    if (tail.shade_count) {
+        tail.planes.from = PT_DATA(shared, shade, from);
+        tail.with_normals |= tail.shows_normals;
+        tail.shading = tail.arrived = NULL; // both are shaded here
+    }
+    memcpy(tail.planes.rect, tail.planes.view->rect, sizeof tail.planes.rect);
+    tail.channels = tail.peel ? 4 : 3;
+    tail.stride = pt_row_stride(tail.planes.view->width);
+    tail.ring = (uint32_t)(2 * tail.reach > tail.reach + 3 ? 2 * tail.reach : tail.reach + 3) + 1;
+    tail.thread_floats = (tail.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR + 4) * tail.stride;
+    pt_blend_weights(tail.weights);
+    uint32_t threads = pt_pool_threads(shared->pool);
+    tail.memory = pt_cpu_scratch(shared, 0, threads * tail.thread_floats * sizeof(float));
+    // sums of tiles behind the walks, on a cache line
+    size_t columns = (tail.planes.view->width + PT_TILE - 1) / PT_TILE;
+    size_t walks = (threads * sizeof *tail.walks + 63) / 64 * 64;
+    tail.walks = pt_cpu_scratch(shared, 1, walks + threads * columns * sizeof(struct pt_tile_sum));
+    if (!tail.memory || !tail.walks)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < threads; i++) {
+        lay_out(&tail, i, &tail.walks[i]);
+        tail.walks[i].next = INT32_MIN;
+        tail.walks[i].tiles = (struct pt_tile_sum *)(void *)((char *)tail.walks + walks) + i * columns;
+    }
+    if (tail.end > tail.base)
+        pt_parallel(shared->pool, (uint32_t)(tail.end - tail.base + UNIT - 1) / UNIT, 1, tail_rows, &tail);
+    return PATINA_OK;
+}
