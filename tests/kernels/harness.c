@@ -55,6 +55,7 @@ struct harness {
     patina_device *device;
     struct baseline *baseline;
     int first, compared;
+    int differed; // something compared has not the first device's bits
     int failures;
     size_t open, pixels; // left open by the reference, of so many
     void *blocks[MOST_BLOCKS];
@@ -147,26 +148,53 @@ void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments
     must(h, result == PATINA_OK, pt_kernels[kernel].name);
 }
 
+// What the first device handed in at this place of the case; NULL: it failed before it came here.
+static const struct saved *next_saved(struct harness *h)
+{
+    const int at = h->compared++;
+    return at < h->baseline->count ? &h->baseline->saved[at] : NULL;
+}
+
+void harness_keep(struct harness *h, const void *data, size_t size)
+{
+    if (!h->first)
+        return;
+    const int at = h->compared++;
+    must(h, at < MOST_SAVED, "one more comparison");
+    struct saved *saved = &h->baseline->saved[at];
+    *saved = (struct saved){malloc(size ? size : 1), size};
+    must(h, saved->data != NULL, "memory");
+    memcpy(saved->data, data, size);
+    h->baseline->count = at + 1;
+}
+
+const void *harness_kept(struct harness *h)
+{
+    if (h->first)
+        return NULL;
+    const struct saved *saved = next_saved(h);
+    return saved && !h->differed ? saved->data : NULL;
+}
+
+int harness_settled(const struct harness *h) { return !h->first && !h->differed && h->compared > 0; }
+
 void harness_same(struct harness *h, const char *label, const void *data, size_t count, size_t element, size_t per_pixel,
                   uint32_t width)
 {
-    int at = h->compared++;
-    must(h, at < MOST_SAVED, "one more comparison");
-    struct saved *saved = &h->baseline->saved[at];
     size_t size = count * element;
     if (h->first) {
-        saved->data = malloc(size ? size : 1);
-        must(h, saved->data != NULL, "memory");
-        memcpy(saved->data, data, size);
-        saved->size = size;
-        h->baseline->count = at + 1;
+        harness_keep(h, data, size);
         return;
     }
-    if (at >= h->baseline->count) // the first device failed before it came here
+    const struct saved *saved = next_saved(h);
+    if (!saved) {
+        h->differed = 1;
         return;
+    }
     must(h, saved->size == size, "same size on every device");
     if (!memcmp(saved->data, data, size))
         return;
+    h->differed = 1;
     size_t different = 0;
     for (size_t i = 0; i < count; i++) {
         const char *got = (const char *)data + i * element, *expected = (const char *)saved->data + i * element;

@@ -50,6 +50,13 @@ int harness_failures(const struct harness *h);
 // Bits must equal what the first device gave under this label. element: 4 or 8 bytes; per_pixel: elements a pixel.
 void harness_same(struct harness *h, const char *label, const void *data, size_t count, size_t element, size_t per_pixel,
                   uint32_t width);
+// Whether all that was compared so far has the bits of the first device: what the reference says of those then holds here too, and a
+// test need not ask it again.
+int harness_settled(const struct harness *h);
+// What the first device's run of the case handed in here: for what a reference takes long to find, of inputs that were compared. Owned by
+// the harness; NULL: not there, to be found and handed in.
+const void *harness_kept(struct harness *h);
+void harness_keep(struct harness *h, const void *data, size_t size);
 // |got - expected| <= error; NaN never is.
 int harness_near(double got, double expected, double error);
 // At most this share of the pixels (TOL_UNSURE_SHARE, TOL_UNSURE_HARD) may have been left open by the reference.

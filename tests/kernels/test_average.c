@@ -173,7 +173,17 @@ static struct planes run(struct harness *h, struct rng *rng, struct setup *s, do
     planes.albedo = harness_read(h, albedo);
     harness_same(h, "albedo", planes.albedo, pixels * 4, 4, 4, scene->view.width);
     harness_same(h, "normal", planes.normal, pixels * 4, 4, 4, scene->view.width);
-    if (!s->args.sifted)
+    // what the reference takes of the device: of measured pixels, elsewhere it is undefined
+    float *before = harness_alloc(h, pixels * 16), *distance = harness_alloc(h, pixels * 4);
+    for (size_t p = 0; p < pixels; p++)
+        if (planes.keys[p] != REF_EMPTY_KEY && planes.from[p] == p) {
+            memcpy(before + 4 * p, planes.before + 4 * p, 16);
+            distance[p] = planes.deff[p];
+        }
+    harness_same(h, "keys", planes.keys, pixels, 8, 1, scene->view.width);
+    harness_same(h, "deff", distance, pixels, 4, 1, scene->view.width);
+    harness_same(h, "normal before", before, pixels * 4, 4, 4, scene->view.width);
+    if (!s->args.sifted && !harness_settled(h))
         hold_against(h, s, &planes, open);
     return planes;
 }

@@ -36,6 +36,8 @@ static struct planes check(struct harness *h, const struct picture *picture, con
 {
     size_t count = (size_t)args->view.width * args->view.height, open = 0;
     struct planes got = run(h, picture, args, keys, from);
+    if (harness_settled(h))
+        return got;
     struct ref_pixel *pixels = harness_alloc(h, count * sizeof *pixels);
     for (size_t i = 0; i < count; i++)
         pixels[i] = ref_pixel(keys[i], from[i]);

@@ -59,6 +59,8 @@ static void check(struct harness *h, const struct soup *s, const float *limit, d
     uint32_t width = s->args.view.width, height = s->args.view.height;
     size_t open = 0;
     harness_same(h, "keys", got, (size_t)width * height, 8, 1, width);
+    if (harness_settled(h))
+        return;
     for (uint32_t at = 0; at < width * height; at++) {
         int x = (int)(at % width), y = (int)(at / width), explained = got[at] == REF_EMPTY_KEY, unsure = 0;
         for (uint32_t t = 0; t < s->args.mesh.id_count; t++) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // splat: the least key of every pixel, where the reference says which discs may and which must cover it.
 #include "discs.h"
+#include "shared/points.h"
 
 #include <math.h>
 
@@ -14,6 +15,8 @@ static uint64_t *check_scene(struct harness *h, struct disc_scene *scene)
     const size_t pixels = (size_t)width * view->height;
     uint64_t *keys = harness_read(h, discs_splat(h, scene));
     harness_same(h, "keys", keys, pixels, 8, 1, width);
+    if (harness_settled(h))
+        return keys;
     uint32_t count;
     const struct ref_disc *discs = discs_reference(h, scene, &count);
     size_t covered = 0;
@@ -232,6 +235,8 @@ static void large(struct harness *h)
             ((float *)scene.radii[0])[i] = (float)(5e-4 * pow(3000.0, i / (DISCS - 1.0)) * (p ? 1.0 + i : 1.0));
         const uint64_t *keys = harness_read(h, discs_splat(h, &scene));
         harness_same(h, "keys", keys, (size_t)WIDTH * HEIGHT, 8, 1, WIDTH);
+        if (harness_settled(h))
+            continue;
         uint32_t count;
         const struct ref_disc *discs = discs_reference(h, &scene, &count);
         for (uint32_t k = 0; k < 20000; k++) {
