@@ -120,27 +120,34 @@ static double jumps(patina_device *device, double density, uint32_t type, uint32
     return (double)far / (double)all;
 }
 
+// All on the first device; on graphics processors without samples, which the executor takes; and one cloud on the processor's other
+// levels: blend's light has the same bits everywhere (tests/kernels/test_blend.c).
 static void test_turning(void **state)
 {
     (void)state;
     static const double densities[] = {0.25, 1.0, 4.0}, most[] = {0.01, 0.01, 0.06}; // of one disc: 0.37 to 0.62
+    int first = 1;
     for (uint32_t i = 0; i < support_device_count(); i++) {
         patina_device *device = support_device_open(support_device_name(i), 0, 0);
         if (!device)
             continue;
+        const int level = !first && strncmp(support_device_name(i), "gl", 2) != 0;
         for (size_t k = 0; k < sizeof densities / sizeof *densities; k++)
             for (uint32_t type = PATINA_LIGHT_SUN; type <= PATINA_LIGHT_POINT; type++) {
+                if (level && (densities[k] != 1.0 || type != PATINA_LIGHT_SUN))
+                    continue;
                 const char *name = type == PATINA_LIGHT_SUN ? "sun" : "lamp";
                 const double share = jumps(device, densities[k], type, 1);
                 printf("  %s: %g points a pixel, %s: %.2f %% of border pixels jump\n", support_device_name(i), densities[k],
                        name, 100.0 * share);
                 assert_true(share <= most[k]);
-                if (type != PATINA_LIGHT_SUN || densities[k] > 1.0)
+                if (!first || type != PATINA_LIGHT_SUN || densities[k] > 1.0)
                     continue;
                 const double many = jumps(device, densities[k], type, 16);
                 printf("    %.2f %% with 16 samples\n", 100.0 * many);
                 assert_true(many <= 0.01);
             }
+        first = 0;
         patina_device_destroy(device);
     }
 }
