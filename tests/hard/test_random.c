@@ -246,26 +246,46 @@ static void add_clip(struct pcg *random, patina_scene *scene)
     patina_scene_add_clip(scene, &clip);
 }
 
+// One of three strengths is there; lengths as the scenes', which are about one across.
+static float effect_number(struct pcg *random, int strength, const char *unit, double least, double most)
+{
+    double low = fmax(least, 0.0), high = fmin(most, 3.0);
+    if (strength && !once_in(random, 3))
+        return 0.0f;
+    if (!strcmp(unit, "PIXELS")) {
+        high = fmin(most, 16.0);
+    } else if (!strcmp(unit, "HEIGHT")) {
+        low = -1.0;
+        high = 1.0;
+    } else if (!strcmp(unit, "LENGTH")) {
+        low = fmax(least, 0.01);
+    }
+    return between(random, low, high);
+}
+
+static uint32_t effect_count(struct pcg *random, uint32_t least, uint32_t most)
+{
+    return once_in(random, 3) ? least + below(random, (most < 16 ? most : 16) - least + 1) : 0;
+}
+
+// Every field of the table of effects.
 static void set_effects(struct pcg *random, patina_scene *scene)
 {
     patina_effects effects = {.struct_size = sizeof effects};
-    effects.edl_strength = once_in(random, 3) ? between(random, 0.0, 3.0) : 0.0f;
-    effects.edl_radius = once_in(random, 2) ? between(random, 1.0, 16.0) : 0.0f;
-    effects.obscurance_strength = once_in(random, 3) ? between(random, 0.0, 3.0) : 0.0f;
-    effects.obscurance_radius = once_in(random, 2) ? between(random, 0.0, 2.0) : 0.0f;
-    effects.toon_bands = once_in(random, 3) ? 2 + below(random, 15) : 0;
-    effects.toon_softness = between(random, 0.0, 1.0);
-    effects.hatch_levels = once_in(random, 3) ? below(random, 4) : 0;
-    effects.hatch_ground = between(random, 0.0, 1.0);
-    effects.contour_opacity = once_in(random, 3) ? between(random, 0.2, 1.0) : 0.0f;
-    effects.contour_interval = between(random, 0.01, 1.0);
-    effects.fog_density = once_in(random, 3) ? between(random, 0.0, 1.0) : 0.0f;
-    effects.fog_start = between(random, 0.0, 3.0);
+#define PATINA_EFFECT_NUMBER(field, when, least, most, zero, unit, ...)                                                        \
+    effects.field = effect_number(random, !strcmp(#when, "STRENGTH"), #unit, (double)(least), (double)(most));
+#define PATINA_EFFECT_COUNT(field, when, least, most, ...) effects.field = effect_count(random, least, most);
+#define PATINA_EFFECT_COLOR(field, ...)                                                                                        \
+    if (once_in(random, 2))                                                                                                    \
+        color(random, effects.field);
+#define PATINA_EFFECT_AXIS(field, ...)                                                                                         \
+    for (int k = 0; k < 3; k++)                                                                                                \
+        effects.field[k] = between(random, -1.0, 1.0);
+#define PATINA_EFFECT_SWITCH(field, ...) effects.field = below(random, 2);
+#define PATINA_EFFECT_CHOICE(field, when, count, ...) effects.field = below(random, count);
+#include "patina/effects.def"
     effects.fog_end = effects.fog_start + between(random, 0.1, 4.0);
-    effects.focus_aperture = once_in(random, 4) ? between(random, 0.0, 0.5) : 0.0f;
-    effects.focus_distance = between(random, 0.1, 5.0);
-    effects.paper_grain = once_in(random, 4) ? between(random, 0.0, 1.0) : 0.0f;
-    patina_scene_set_effects(scene, &effects);
+    assert_int_equal(patina_scene_set_effects(scene, &effects), PATINA_OK);
 }
 
 static void set_lines(struct pcg *random, patina_scene *scene)
