@@ -17,8 +17,8 @@ from PIL import Image, ImageDraw, ImageFont
 POINTS = 600_000
 SHOWN, GAP, LABEL = (380, 285), 6, 22
 PAPER, INK = (250, 250, 248), (40, 40, 40)
-STEPS = ("1  as scanned", "2  strokes of the brush", "3  painted points are soft", "4  opacity 0.03")
-MODES = {"SP": "splats (SP)", "OLT": "one layer transparent (OLT)", "ST": "soft (ST)"}
+STEPS = ("1  as scanned", "2  from beside: strokes of the brush", "3  painted points are soft", "4  opacity 0.05")
+MODES = {"surface": "as surface", "SP": "splats (SP)", "OLT": "one layer transparent (OLT)", "ST": "soft (ST)"}
 
 
 def sheet(rows: list[list[tuple[Path, str]]], target: Path, inset: Path | None = None) -> None:

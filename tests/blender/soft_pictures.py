@@ -17,9 +17,11 @@ from mathutils import Euler, Vector
 
 SIZE = (760, 570)
 MODES = {"SP": "SPLATS", "OLT": "ONE_LAYER", "ST": "EXPRESS"}
-LEAVES = (  # strokes over the leaves on either side of the lion: places in parts of the picture, from its bottom left, and the brush's radius
-    ([(0.04, 0.30), (0.10, 0.45), (0.06, 0.62), (0.16, 0.70)], 0.09),
-    ([(0.95, 0.25), (0.90, 0.42), (0.94, 0.58), (0.84, 0.68)], 0.09))
+BEFORE, BESIDE = (150, 12, 0.55), (32, 14, 0.5)  # the lion's sides: azimuth, elevation, share of the box's diagonal that is seen
+LEAVES = (  # strokes over the leaves, seen from beside: places in parts of the picture, from its bottom left, and the brush's radius
+    ([(0.04, 0.30), (0.06, 0.45), (0.12, 0.55), (0.06, 0.68)], 0.07),
+    ([(0.84, 0.52), (0.90, 0.40), (0.94, 0.44), (0.84, 0.33)], 0.06),
+    ([(0.72, 0.65), (0.74, 0.63)], 0.04))
 
 
 def start():
@@ -70,13 +72,15 @@ def save(path):
 
 
 def painted(scan, folder):
-    """Four steps: the scan, the strokes as a ramp of what is painted, the leaves soft, and harder to see."""
+    """Four steps: leaves stand before the lion; from beside strokes are painted over them, shown as a ramp; soft; and fainter."""
     scene = stage()
     bpy.ops.import_scene.patina_points(filepath=str(scan))
     obj = bpy.context.view_layer.objects.active
-    aim(scene, obj, 32, 14, 0.5)
+    aim(scene, obj, *BEFORE)
     save(folder / "paint-1.png")
+    aim(scene, obj, *BESIDE)
     for places, radius in LEAVES:
+        bpy.context.view_layer.update()
         bpy.ops.object.patina_soft_brush(path=[{"name": "", "loc": (x * SIZE[0], y * SIZE[1]), "time": 0.0} for x, y in places],
                                          radius=radius * SIZE[0], through=True)
     group, colors = obj.patina.soft, obj.patina.colors
@@ -84,28 +88,29 @@ def painted(scan, folder):
     colors.source, colors.scalar, colors.use_range, colors.range_min, colors.range_max = 'SCALAR', group.attribute, True, 0.0, 1.0
     save(folder / "paint-2.png")
     colors.source = 'OWN'
-    group.use, group.opacity = True, 0.2
+    group.use, group.opacity = True, 0.3
+    aim(scene, obj, *BEFORE)
     save(folder / "paint-3.png")
     from patina import histogram
     from patina.thumbnails import save as write
     known = histogram.of(obj)
     pixels = histogram.picture(known.counts, group.threshold, group.transition)[::-1]
     write(np.round(pixels * 255).astype(np.uint8), folder / "paint-histogram.png")
-    group.opacity = 0.03
+    group.opacity = 0.05
     save(folder / "paint-4.png")
 
 
 def compared(obj, name, folder):
-    """Each way that this Blender's Patina knows; without splats of its own, SP is the surface as it is drawn otherwise."""
+    """As surface, and each way that this Patina knows."""
     scene = bpy.context.scene
     known = {item.identifier for item in scene.patina.bl_rna.properties["soft_model"].enum_items}
+    obj.patina.soft.use = False
+    save(folder / f"{name}-surface.png")
+    obj.patina.soft.use = True
     for mode, model in MODES.items():
-        if model not in known and mode != "SP":
-            continue
-        obj.patina.soft.use = model in known
         if model in known:
             scene.patina.soft_model = model
-        save(folder / f"{name}-{mode}.png")
+            save(folder / f"{name}-{mode}.png")
 
 
 def trees(scan, folder):
