@@ -19,7 +19,7 @@ from .native.points import Field
 from .sync.colors import class_bits
 from .sync.soft import Soft
 
-SIZE = 256  # pixels a side: one column a bin
+SIZE, WIDE = 256, 4  # pixels a side; of a bar, which is of as many bins: one of painted points, all at 0 or 1, is to be seen
 _PAPER, _HARD, _SOFT, _LEADS, _LINE = ((*color, 1.0) for color in (
     (0.11, 0.11, 0.11), (0.55, 0.55, 0.55), (0.33, 0.62, 0.95), (0.16, 0.20, 0.26), (1.0, 0.72, 0.25)))
 
@@ -92,6 +92,7 @@ def icon(obj: bpy.types.Object, known: Known) -> int:
 
 def picture(counts: np.ndarray, threshold: float, transition: float) -> np.ndarray:
     """(SIZE, SIZE, 4) float32, sRGB, the lowest row first. Heights are square roots, so that few points among many are seen."""
+    counts = counts.reshape(-1, WIDE).sum(1).repeat(WIDE)
     heights = np.sqrt(counts / max(counts.max(), 1)) * (SIZE - 8)
     column = np.arange(SIZE)
     value = (column + 0.5) / SIZE
