@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // differ: how far scans lie apart, cell by cell, over keys that scatter made: random clouds of several scans, and two planes.
 #include "points.h"
+#include "shared/points.h"
 #include "shared/ranges.h"
 
 #include <math.h>
