@@ -98,7 +98,9 @@ class PatinaSceneProperties(PropertyGroup):
         items=(
             ('BASE', "Base", "Exactly, where balls intersect too", 0),
             ('CONCENTRIC', "Concentric", "By shells of even density: close to Base", 1),
-            ('EXPRESS', "Express", "A disc a ball: about ten times faster", 2)))
+            ('EXPRESS', "Express", "A disc a ball: about ten times faster", 2),
+            ('SPLATS', "Splats", "To compare with: the nearest discs alone, opaque", 3),
+            ('ONE_LAYER', "One Layer", "To compare with: the nearest discs alone, transparent", 4)))
     layers: IntProperty(
         name="Layers", override=_OVERRIDE, default=8, min=1, max=MOST_LAYERS,
         description="At most so many layers of surface are drawn behind one another where something is transparent. "

@@ -25,8 +25,8 @@ int pt_gl_gather(struct pt_gl_device *d, const struct pt_gl_work *work)
     return pt_gl_points_of(d, work, variant);
 }
 
-// Variants of soft, drawing last: by model.
-enum { COUNT, FILL, SORT, DRAW };
+// Variants of soft, drawing last: by model, and so are those of lights' views.
+enum { COUNT, FILL, SORT, DRAW, VEIL = DRAW + PT_SOFT_MODELS };
 enum { RUN = 256, GROUP = 64 }; // tiles between two looks at cancel; invocations that share out records, as in soft.comp
 enum { TOLD = 64, ENTRY = 8, STATE = 32 }; // bytes: what is counted; an entry of a list; a pixel, as in soft.comp
 enum { SORTED_AT_ONCE = 1 << 16 };         // entries of a list: 17 * 8 rounds of 128 steps
@@ -36,6 +36,7 @@ struct soft {
     const struct pt_gl_work *work;
     const struct soft_args *args;
     uint32_t columns, tiles, model;
+    uint32_t draw; // which variant does
     uint32_t *counts, *begins; // of every tile; of the batch's, and the end of the last
 };
 
@@ -43,9 +44,10 @@ static int programs(struct pt_gl_device *d, const struct soft *soft)
 {
     int result = PATINA_OK;
     for (uint32_t step = COUNT; step <= DRAW && result == PATINA_OK; step++) {
-        const uint32_t variant = step < DRAW ? step : DRAW + soft->model;
+        const uint32_t variant = step < DRAW ? step : soft->draw;
         char definitions[64];
-        snprintf(definitions, sizeof definitions, "#define STEP %u\n#define MODEL %u\n", step, soft->model);
+        snprintf(definitions, sizeof definitions, "#define STEP %u\n#define MODEL %u\n#define VEIL %d\n", step, soft->model,
+                 soft->args->veils > 0);
         result = pt_gl_kernel_program(d, PT_KERNEL_soft, variant, definitions);
         if (result == PATINA_OK)
             d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_soft][variant], 2, soft->columns);
@@ -133,7 +135,7 @@ static int draw_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t 
     int result = PATINA_OK;
     for (uint32_t part = 0; unfinished && result == PATINA_OK; part++) {
         clear(d, flag, sizeof unfinished);
-        result = run_tiles(d, soft, DRAW + soft->model, first, end, part);
+        result = run_tiles(d, soft, soft->draw, first, end, part);
         d->gl.BindBuffer(GL_COPY_READ_BUFFER, flag);
         d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof unfinished, &unfinished);
     }
@@ -176,7 +178,7 @@ static int can_loop(struct pt_gl_device *d, const struct soft *soft)
     if (soft->tiles > STEPS)
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "soft points: a picture of %u tiles; OpenGL in software takes %d",
                           soft->tiles, STEPS);
-    if (soft->model != PT_SOFT_EXPRESS && most > (STEPS - PT_SOFT_PART) / 2)
+    if (!PT_SOFT_DISCS(soft->model) && !soft->args->veils && most > (STEPS - PT_SOFT_PART) / 2)
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
                           "soft points: %u balls on a tile; OpenGL in software takes %u, but for the Express model", most,
                           (STEPS - PT_SOFT_PART) / 2);
@@ -188,6 +190,7 @@ int pt_gl_soft(struct pt_gl_device *d, const struct pt_gl_work *work)
     const struct soft_args *args = work->arguments;
     const uint32_t *rect = args->view.rect;
     struct soft soft = {.work = work, .args = args, .model = args->model};
+    soft.draw = (args->veils ? VEIL : DRAW) + soft.model;
     soft.columns = (rect[2] - rect[0] + PT_SOFT_TILE - 1) / PT_SOFT_TILE;
     soft.tiles = soft.columns * ((rect[3] - rect[1] + PT_SOFT_TILE - 1) / PT_SOFT_TILE);
     soft.counts = calloc(2 * ((size_t)soft.tiles + 1), sizeof *soft.counts);

@@ -7,6 +7,8 @@
 #include "light_points.h"
 #include "scene/clip.h"
 #include "scene/mask.h"
+#include "scene/soft.h"
+#include "shared/balls.h"
 #include "base/elementary.h"
 
 #include <math.h>
@@ -24,12 +26,39 @@
 static const double coarseness = 1.2, coarseness_bare = 1.8;
 static const double widest = 1.7320508075688772; // tangent of 60 degrees
 enum { LEAST_TEXELS = 16, SURVEY_TEXELS = 1024, MESH_TEXELS = 2048 };
+// Of soft points: texels of a quarter of a ball's radius (of half, shadows are off by twice as much), at most so many across, and as many slabs of depth as fit into 64 MB. Over
+// tests/scenes/test_soft_shadow: SPEC 5.
+enum { SOFT_TEXELS = 1024, VEIL_NUMBERS = 1 << 24 };
 
 // ---- casters and receivers ---------------------------------------------------------------------------------------------
 
 static int casts(const struct pt_instance *instance)
 {
     return !(instance->style.shadow_off & PATINA_SHADOW_NO_CAST) && instance->cloud->info.drawn;
+}
+
+// Whether some of its points are surface; whether some are balls that take light.
+static int casts_solid(const struct pt_instance *instance) { return casts(instance) && !pt_all_soft(instance); }
+
+static int casts_soft(const struct pt_instance *instance)
+{
+    return casts(instance) && instance->style.soft != PATINA_SOFT_OFF && instance->style.transparency < 1.0f;
+}
+
+int pt_soft_casts(const struct patina_scene *scene)
+{
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (casts_soft(&scene->instances[i]))
+            return 1;
+    return 0;
+}
+
+int pt_soft_receives(const struct patina_scene *scene)
+{
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (scene->instances[i].style.soft != PATINA_SOFT_OFF && pt_receives(&scene->instances[i]))
+            return 1;
+    return 0;
 }
 
 int pt_mesh_casts(const struct pt_mesh_instance *instance)
@@ -53,7 +82,8 @@ int pt_receives(const struct pt_instance *instance)
 
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan)
 {
-    return scene->settings.shadow_lazy && plan->layers <= 1 && !(scene->settings.shadow_error > 0.0f);
+    return scene->settings.shadow_lazy && plan->layers <= 1 && !(scene->settings.shadow_error > 0.0f) &&
+           !pt_soft_receives(scene);
 }
 
 // What it takes of 255 parts of light.
@@ -69,13 +99,13 @@ static int spares_itself(const struct pt_instance *instance)
 
 static int opaque(const struct pt_instance *instance)
 {
-    return casts(instance) && loss_of(instance) == 255 && !instance->cloud->info.has_opacities;
+    return casts_solid(instance) && loss_of(instance) == 255 && !instance->cloud->info.has_opacities;
 }
 
 // Layer behind layer, for its points have opacities of their own.
 static int in_layers(const struct pt_instance *instance)
 {
-    return casts(instance) && loss_of(instance) && instance->cloud->info.has_opacities;
+    return casts_solid(instance) && loss_of(instance) && instance->cloud->info.has_opacities;
 }
 
 int pt_casts_in_layers(const struct patina_scene *scene)
@@ -94,13 +124,15 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         casters += (uint32_t)pt_mesh_casts(&scene->meshes[i]);
     if (casters)
-        groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, PT_NO_INSTANCE, 255, 0};
+        groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, PT_NO_INSTANCE, 255, 0, 0};
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
         if (opaque(instance) && spares_itself(instance) && pt_receives(instance) && casters > 1)
-            groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, i, 255, 0};
-        if (casts(instance) && loss_of(instance) && !opaque(instance))
-            groups[count++] = (struct pt_shadow_group){i, PT_NO_INSTANCE, loss_of(instance), in_layers(instance)};
+            groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, i, 255, 0, 0};
+        if (casts_solid(instance) && loss_of(instance) && !opaque(instance))
+            groups[count++] = (struct pt_shadow_group){i, PT_NO_INSTANCE, loss_of(instance), in_layers(instance), 0};
+        if (casts_soft(instance))
+            groups[count++] = (struct pt_shadow_group){i, PT_NO_INSTANCE, 255, 0, 1};
     }
     return count;
 }
@@ -129,18 +161,14 @@ int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_g
 // Bounds of the casters' chunks in a frame (rows x, y, z) from `eye`; perspective: of x / -z and y / -z too.
 struct extent {
     const double *axes, *eye;
+    double reach; // of balls beyond their centres
     int some, behind; // behind: part of it is beside or behind the eye
     double lower[3], upper[3];
     double tangent[4]; // left, bottom, right, top
 };
 
-static void extend(void *context, const double corner[3])
+static void extend_to(struct extent *extent, const double p[3])
 {
-    struct extent *extent = context;
-    double p[3], away[3];
-    for (int k = 0; k < 3; k++)
-        away[k] = corner[k] - extent->eye[k];
-    pt_apply(extent->axes, away, p);
     for (int k = 0; k < 3; k++) {
         extent->lower[k] = extent->some ? fmin(extent->lower[k], p[k]) : p[k];
         extent->upper[k] = extent->some ? fmax(extent->upper[k], p[k]) : p[k];
@@ -154,6 +182,24 @@ static void extend(void *context, const double corner[3])
     extent->some = 1;
 }
 
+static void extend(void *context, const double corner[3])
+{
+    struct extent *extent = context;
+    double p[3], away[3];
+    for (int k = 0; k < 3; k++)
+        away[k] = corner[k] - extent->eye[k];
+    pt_apply(extent->axes, away, p);
+    if (!(extent->reach > 0.0)) {
+        extend_to(extent, p);
+        return;
+    }
+    for (int side = 0; side < 8; side++) {
+        const double q[3] = {p[0] + (side & 1 ? 1.0 : -1.0) * extent->reach, p[1] + (side & 2 ? 1.0 : -1.0) * extent->reach,
+                             p[2] + (side & 4 ? 1.0 : -1.0) * extent->reach};
+        extend_to(extent, q);
+    }
+}
+
 // The scene with those of its clips that count for shadows. Its handle is not to be touched.
 static struct patina_scene as_cut(const struct patina_scene *scene)
 {
@@ -161,6 +207,34 @@ static struct patina_scene as_cut(const struct patina_scene *scene)
     if (scene->settings.shadow_uncut)
         cut.clip_count = 0;
     return cut;
+}
+
+// World units: of the widest ball, or of most balls of the cloud.
+static double ball_radius(const struct pt_instance *instance, int most)
+{
+    const double *m = instance->style.world_from_object;
+    double scale = 0.0, reach = 0.0;
+    if (instance->style.soft_radius > 0.0f)
+        return (double)instance->style.soft_radius;
+    for (int c = 0; c < 3; c++)
+        scale = fmax(scale, sqrt(m[c] * m[c] + m[4 + c] * m[4 + c] + m[8 + c] * m[8 + c]));
+    for (uint32_t c = 0; c < instance->cloud->chunk_count; c++) {
+        const double own = pt_soft_reach(instance->cloud, &instance->cloud->chunks[c]);
+        reach = most || c == 0 ? fmax(reach, own) : fmin(reach, own);
+    }
+    return scale * (most ? reach : 0.5 * reach);
+}
+
+// room: NULL: chunks are seen whole.
+static void look_at_points(const struct patina_scene *cut, const struct pt_instance *instance, enum pt_points points,
+                           struct pt_inverse_clip *room, struct extent *extent)
+{
+    const struct pt_sieve sieve = room ? pt_sieve_make(cut, instance, points, room) : (struct pt_sieve){.instance = instance};
+    extent->reach = points == PT_SOFT_POINTS ? ball_radius(instance, 1) : 0.0;
+    for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
+        if (pt_sieve_chunk(&sieve, &instance->cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
+            pt_chunk_corners(&instance->cloud->chunks[c], instance->style.world_from_object, extend, extent);
+    extent->reach = 0.0;
 }
 
 static struct extent look(const struct patina_scene *scene, const struct pt_shadow_group *group, const double axes[9],
@@ -173,11 +247,10 @@ static struct extent look(const struct patina_scene *scene, const struct pt_shad
         const struct pt_instance *instance = &scene->instances[i];
         if (group ? !pt_group_casts(scene, group, i) : !casts(instance))
             continue;
-        const struct pt_sieve sieve = room ? pt_sieve_make(&cut, instance, PT_SOLID_POINTS, room)
-                                           : (struct pt_sieve){.instance = instance};
-        for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
-            if (pt_sieve_chunk(&sieve, &instance->cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
-                pt_chunk_corners(&instance->cloud->chunks[c], instance->style.world_from_object, extend, &extent);
+        if (group ? !group->soft : casts_solid(instance))
+            look_at_points(&cut, instance, PT_SOLID_POINTS, room, &extent);
+        if (group ? group->soft : casts_soft(instance))
+            look_at_points(&cut, instance, PT_SOFT_POINTS, room, &extent);
     }
     free(room);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
@@ -308,7 +381,9 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
             instances[out->instance_count] = scene->instances[i];
             instances[out->instance_count].style.cull_back = 0;      // both sides cast
             instances[out->instance_count].style.surface = 0;        // maps are filled
-            instances[out->instance_count++].style.transparency = 0; // its map has one layer
+            if (!group->soft)
+                instances[out->instance_count].style.transparency = 0; // its map has one layer
+            out->instance_count++;
         }
     out->meshes = meshes;
     out->mesh_count = 0;
@@ -324,13 +399,26 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
                                       .surface = PATINA_SURFACE_FILL};
     patina_camera *camera = &out->camera;
     uint32_t most = scene->settings.shadow_resolution;
-    out->settings.width = fit(&camera->left, &camera->right, light->texel, most);
-    out->settings.height = fit(&camera->bottom, &camera->top, light->texel, most);
+    double texel = light->texel;
+    if (group->soft) {
+        // the middle of the balls, or of those before a light among them
+        const double away = parallel ? 1.0 : -0.5 * extent.lower[2] + fmax(-0.5 * extent.upper[2], 0.0);
+        most = most < SOFT_TEXELS ? most : SOFT_TEXELS;
+        texel = 0.25 * ball_radius(&scene->instances[group->only], 0) / away;
+    }
+    out->settings.width = fit(&camera->left, &camera->right, texel, most);
+    out->settings.height = fit(&camera->bottom, &camera->top, texel, most);
     out->settings.region[2] = out->settings.width;
     out->settings.region[3] = out->settings.height;
     const double cube[4] = {-1.0, -1.0, 1.0, 1.0}, whole[4] = {camera->left, camera->bottom, camera->right, camera->top};
     memcpy(window, light->cube ? cube : whole, sizeof whole);
     return 1;
+}
+
+uint32_t pt_veil_slabs(const struct patina_scene *map)
+{
+    const uint32_t slabs = VEIL_NUMBERS / (map->settings.width * map->settings.height);
+    return slabs < PT_SOFT_VEILS ? slabs : PT_SOFT_VEILS;
 }
 
 // ---- planning a light ----------------------------------------------------------------------------------------------------
@@ -430,7 +518,7 @@ int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, u
 {
     static const char *const names[] = {"", "sun", "point light", "spot", "area light"};
     struct pt_plan_light *planned = &plan->lights[i];
-    struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (2 * scene->instance_count + 1) * sizeof *groups);
+    struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (3 * (size_t)scene->instance_count + 1) * sizeof *groups);
     struct pt_instance *instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *instances);
     struct pt_mesh_instance *meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *meshes);
     if (!groups || !instances || !meshes || pt_plan_light_map(scene, plan, i))
@@ -548,6 +636,14 @@ static void put_instance(struct key *key, const struct patina_scene *scene, cons
     put(key, (double)loss_of(instance));
     put(key, (double)instance->style.lighting);
     put(key, (double)instance->style.d_min);
+    if (casts_soft(instance)) {
+        const patina_cloud_style *style = &instance->style;
+        const double own[] = {(double)style->soft,         (double)style->soft_model,   (double)style->soft_shells,
+                              (double)style->soft_radius,  (double)style->soft_opacity, (double)style->soft_modulation,
+                              (double)style->transparency};
+        for (size_t k = 0; k < sizeof own / sizeof *own; k++)
+            put(key, own[k]);
+    }
     put_matrix(key, scene, planned, instance->style.world_from_object);
     put_cuts(key, scene, instance);
 }

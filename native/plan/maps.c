@@ -84,6 +84,7 @@ static int pixels_as_cloud(const struct patina_scene *scene, const struct pt_pla
 
 struct tests {
     struct pt_builder builder;               // of the map
+    const struct pt_shadow_group *group;
     const struct patina_scene *scene, *view; // the picture's, and as the light sees it
     const struct pt_plan *picture;
     const struct pt_round *round;
@@ -91,6 +92,35 @@ struct tests {
     struct pt_ref opacities;
     struct lit_args args;
 };
+
+// Behind soft points: with what the surfaces' tests are asked.
+static void add_dim(struct tests *tests, uint32_t instance, const struct lit_args *lit, struct pt_ref positions)
+{
+    struct pt_plan *map = tests->builder.plan;
+    struct dim_args args = {.view = lit->view,
+                            .base = lit->base,
+                            .alone = lit->alone,
+                            .close = lit->close,
+                            .samples = lit->samples,
+                            .compare = lit->compare,
+                            .marked = lit->marked,
+                            .veils = map->veils,
+                            .veil_from = map->soft_depths[0],
+                            .veil_scale = 1.0f / pt_veil_deep(map)};
+    memcpy(args.window, lit->window, sizeof args.window);
+    const struct pt_ref refs[] = {pt_plane_at(PT_PLANE_VEIL, 0),
+                                  {PT_OF_RECEIVER, PT_CHUNKS, map->receiver_count},
+                                  positions,
+                                  pt_buffer_of(PT_MARKS, instance),
+                                  pt_buffer_of(PT_SHADOWS, instance),
+                                  {PT_OF_FLAG, PT_FLAG_DIFFERS, 0}};
+    map->receiver_count++;
+    struct pt_pass *pass = pt_add(&tests->builder, PT_KERNEL_dim, "lit", &args, sizeof args, refs, sizeof refs / sizeof *refs);
+    if (instance == PT_PIXELS)
+        PT_REASON(pass, "pixels that show meshes are tested");
+    else
+        PT_REASON(pass, "points of instance %u are tested", instance);
+}
 
 static int add_lit(struct tests *tests, uint32_t instance, const struct pt_instance *receiver, struct pt_ref positions,
                    struct pt_ref words)
@@ -110,6 +140,10 @@ static int add_lit(struct tests *tests, uint32_t instance, const struct pt_insta
         out->chunk_count = keep_seen(tests->picture, instance, out->chunks, out->chunk_count);
     if (!out->chunk_count)
         return PATINA_OK;
+    if (tests->group && tests->group->soft) {
+        add_dim(tests, instance, &args, positions);
+        return PATINA_OK;
+    }
     const struct pt_ref refs[] = {tests->planes[0],
                                   tests->planes[1],
                                   tests->planes[2],
@@ -225,6 +259,7 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
     *map = (struct pt_plan){.map = 1};
     struct tests tests = begin_tests(scene, picture, round, map);
     tests.view = &view;
+    tests.group = group;
     struct pt_builder builder = {.scene = &view, .plan = map, .behind = round->layer > 0, .as = "light map"};
     struct pt_instance *instances = pt_arena_take(&map->arena, (scene->instance_count + 1) * sizeof *instances);
     struct pt_mesh_instance *meshes = pt_arena_take(&map->arena, (scene->mesh_count + 1) * sizeof *meshes);
@@ -233,9 +268,17 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
                                  &view, window))
         return error;
     pt_handle_init(&view.handle);
-    error = pt_plan_depth(&builder);
-    if (!error && pt_plan_shows(map)) {
-        pt_plan_clears(&builder, 0);
+    if (group->soft) {
+        map->veils = pt_veil_slabs(&view);
+        error = pt_plan_view(&view, map);
+    } else {
+        error = pt_plan_depth(&builder);
+    }
+    if (!error && (group->soft ? map->soft_part_count > 0 : pt_plan_shows(map))) {
+        if (group->soft)
+            pt_plan_veil(&builder);
+        else
+            pt_plan_clears(&builder, 0);
         tests.builder.room = builder.room; // goes on where that ended
         tests.builder.listed = builder.listed;
         tests.builder.step_room = builder.step_room;

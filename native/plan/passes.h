@@ -117,6 +117,7 @@ void pt_add_passes_step(struct pt_builder *builder, enum pt_step_of of);
 // What is cleared before the layer at hand; shown: what pixels show of meshes too.
 void pt_plan_clears(struct pt_builder *builder, int shown);
 void pt_plan_no_density(struct pt_builder *builder); // before soft points are counted in the pass
+void pt_plan_no_veil(struct pt_builder *builder);    // before those of a light's map are
 void pt_plan_peeling(struct pt_builder *builder);    // and before the first of several
 void pt_plan_light_steps(struct pt_builder *builder);
 
@@ -179,6 +180,13 @@ static inline int pt_counts_soft(const struct pt_builder *builder) // for the pa
 // Of several layers, before one is shaded: those between it and the layer before; and behind the last.
 void pt_plan_soft_layer(struct pt_builder *builder);
 void pt_plan_soft_beyond(struct pt_builder *builder);
+// Of a light's map with soft points in it: what its rays lose in each of plan->veils slabs.
+void pt_plan_veil(struct pt_builder *builder);
+static inline float pt_veil_deep(const struct pt_plan *plan)
+{
+    const float deep = (plan->soft_depths[1] - plan->soft_depths[0]) / (float)plan->veils;
+    return deep > 1e-30f ? deep : 1e-30f;
+}
 
 // assess.c: certainty and thickness of what the picture shows.
 void pt_plan_assess(struct pt_builder *builder);

@@ -344,7 +344,7 @@ static struct extract_args extract_args(const struct pt_builder *builder, uint32
                                 .depth = passes >> PATINA_PASS_DEPTH & 1u,
                                 .normal = passes >> PATINA_PASS_NORMAL & 1u,
                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
-                                .shadow = plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u),
+                                .shadow = pt_plan_shows(plan) && plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u),
                                 .discs_first = plan->discs_first,
                                 // of layers only the last is there still; where no disc is drawn nothing says where one fell
                                 .discs_count = plan->layers > 1 || !draws_discs(plan) ? 0 : plan->discs_count};
@@ -446,12 +446,15 @@ static void plan_marks(struct pt_builder *builder)
         pt_skip(builder, "mark",
                 none                                   ? none
                 : plan->layers > 1                     ? "what later layers show is not known yet"
+                : pt_soft_receives(builder->scene)     ? "soft points all take shadows"
                 : builder->scene->settings.shadow_lazy ? "the error target is measured on whole shadow textures"
                                                        : "whole shadow textures, to be kept");
     if (none)
         pt_skip(builder, "lit", none);
     if (none || !pt_casts_in_layers(builder->scene))
         pt_skip(builder, "limit", none ? none : "the points of no cloud that casts have opacities of their own");
+    if (none || !pt_soft_casts(builder->scene))
+        pt_skip(builder, "dim", none ? none : "no soft point casts shadows");
     const int blended = !none && lazy && pt_blends_light(builder); // all that a pixel of discs shows, then
     int marked = !blended;
     if (blended)
@@ -498,7 +501,8 @@ static int is_planned(const struct pt_plan *plan, enum pt_kernel kernel)
 static void skip_rest(struct pt_builder *builder, const char *reason, int of_points)
 {
     for (int k = 0; k < PT_KERNEL_COUNT; k++)
-        if ((!of_points || is_of_points(pt_kernels[k].stage)) && !is_planned(builder->plan, (enum pt_kernel)k))
+        if ((!of_points || is_of_points(pt_kernels[k].stage)) && !is_planned(builder->plan, (enum pt_kernel)k) &&
+            !(builder->plan->light_count && pt_kernels[k].stage == PT_STAGE_shadows)) // in the lights' maps
             pt_skip(builder, pt_kernels[k].name, reason);
 }
 
@@ -597,8 +601,8 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     pt_plan_meshes(builder, 1);
     pt_plan_average(builder);
     pt_plan_lines(builder);
-    pt_plan_soft_layer(builder);
     plan_shadows(builder);
+    pt_plan_soft_layer(builder);
     uint32_t tail = plan->pass_count;
     for (int own = pt_effects_want_albedo(builder->scene); own >= 0; own--) { // normals are shown by the last
         enum pt_plane shaded = own ? PT_PLANE_UNLIT : PT_PLANE_COLOR_A;
@@ -729,11 +733,14 @@ static void plan_points(struct pt_builder *builder)
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
-    builder->plan->light_count = 0;
     builder->plan->line_radius = 0.0f;
     pt_plan_clears(builder, 1);
     if (builder->plan->soft_count)
         pt_plan_sift(builder);
+    if (builder->plan->light_count) {
+        pt_add_passes_step(builder, PT_STEP_PASSES);
+        pt_plan_light_steps(builder);
+    }
     plan_output(builder, PT_PLANE_COLOR_A);
     plan_soft(builder);
     pt_plan_paper(builder);
@@ -774,7 +781,7 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
     if (!scene->has_camera)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
     int error = pt_plan_view(scene, plan);
-    if (!error && pt_plan_shows(plan) && !no_shadows(scene))
+    if (!error && (pt_plan_shows(plan) || plan->soft_part_count) && !no_shadows(scene))
         pt_plan_lights(scene, plan);
     if (!error) {
         if (pt_plan_shows(plan))

@@ -21,7 +21,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 // X(name, format, size, slots, carried)
 //   size: WINDOW: the view's; LIGHTS: one of these for each light that casts shadows; CROP: the picture that callers read; TILES: of
 //         16 x 16 pixels of the window; RECORDS: no pixels, but plan->soft_records of them; BINS: as many as these need; CELLS: of the
-//         largest image buffer
+//         largest image buffer; VEILS: the view's, plan->veils for each pixel
 //   slots: ONE; LEVELS: coarser ones too; LAYERS: one each
 //   carried: from layer to layer
 #define PT_PLANES(X)                                                                                                           \
@@ -75,6 +75,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(SOFT_POINTS, record, RECORDS, ONE, 0)                                                                                    \
     X(SOFT_BINS, bins, BINS, ONE, 0)                                                                                           \
     X(SOFT_REACHED, f32, WINDOW, ONE, 0)                                                                                       \
+    X(VEIL, f32, VEILS, ONE, 0)                                                                                                \
     X(CERTAINTY, f32, CROP, ONE, 0)                                                                                            \
     X(THICKNESS, f32, CROP, ONE, 0)                                                                                            \
     X(DENSITY, f32, CROP, ONE, 0)                                                                                              \
@@ -97,7 +98,8 @@ enum pt_plane_size {
     PT_SIZE_TILES,
     PT_SIZE_RECORDS,
     PT_SIZE_BINS,
-    PT_SIZE_CELLS
+    PT_SIZE_CELLS,
+    PT_SIZE_VEILS
 };
 enum pt_plane_slots { PT_SLOTS_ONE, PT_SLOTS_LEVELS, PT_SLOTS_LAYERS };
 
@@ -232,6 +234,7 @@ struct pt_shadow_group {
     uint32_t only, without; // instances, or PT_NO_INSTANCE
     uint32_t loss;          // 1..255
     int faint;              // its points have opacities of their own
+    int soft;               // its soft points: no surface, but what they let through up to any depth
 };
 enum {
     PT_NO_INSTANCE = 0xFFFFFFFFu,
@@ -271,6 +274,8 @@ struct pt_plan {
     struct pt_soft_part *soft_parts;   // those farther away first, rows beside each other
     uint32_t soft_part_count;
     uint32_t soft_records;             // room for the largest part
+    float soft_depths[2];              // z that balls of the whole picture begin and end at
+    uint32_t veils;                    // of a light's map: slabs of depth that its soft points are counted in; 0: it is one of surfaces
     uint32_t discs_first, discs_count; // ids whose points are discs
     int sigmas;  // some points know how thick their surface is: d_eff follows it, and the span plane holds
     int reaches; // points know how far they spread: holes are closed no farther
@@ -447,14 +452,19 @@ static inline uint32_t pt_light_faces(const struct pt_plan *plan, uint32_t i) { 
 int pt_receives(const struct pt_instance *instance); // shadows, at all
 int pt_mesh_casts(const struct pt_mesh_instance *instance);
 int pt_mesh_receives(const struct pt_mesh_instance *instance);
+int pt_soft_casts(const struct patina_scene *scene);    // some soft point does
+int pt_soft_receives(const struct patina_scene *scene); // shadows: some soft point
 int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: its points have opacities of their own
 // Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late. Not
-// with an error target: a part of the picture would stop at other samples than the whole.
+// with an error target: a part of the picture would stop at other samples than the whole. Not where soft points take shadows: no
+// pixel tells which of them it shows.
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);
 
-uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups); // at most 2 instances + 1
+uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups); // at most 3 instances + 1
 int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
 int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
+
+uint32_t pt_veil_slabs(const struct patina_scene *map); // of a soft group's scene: as many as there is memory for
 
 // A scene of the group's casters as a sample of the light sees them, for pt_plan_depth. instances, meshes: room for the scene's. The
 // window is what of the map counts, in window units: left, bottom, right, top. 0: there is nothing to see.

@@ -129,6 +129,8 @@ static uint32_t slab_ends(struct placing *p, float ends[MOST_SLABS])
     uint32_t count = 0;
     for (uint32_t i = 0; i < p->seen_count; i++)
         total += p->seen[i].records;
+    if (p->plan->soft_count && p->whole[0].instance->style.soft_model >= PATINA_SOFT_SPLATS)
+        return 0; // each slab would have a nearest surface
     const uint64_t wanted = total <= PART_RECORDS ? 1 : 2 * total / PART_RECORDS + 1,
                    slabs = wanted < MOST_SLABS ? wanted : MOST_SLABS;
     qsort(p->seen, p->seen_count, sizeof *p->seen, by_middle);
@@ -141,12 +143,24 @@ static uint32_t slab_ends(struct placing *p, float ends[MOST_SLABS])
     return count;
 }
 
+// The pixels that soft points are drawn on: a light's map is read between its texels' middles.
+static void drawn_rect(const struct pt_plan *plan, uint32_t rect[4])
+{
+    const uint32_t *crop = plan->crop, around = plan->veils > 0;
+    for (int k = 0; k < 2; k++) {
+        rect[k] = crop[k] - around; // there is a guard
+        rect[2 + k] = crop[k] + crop[2 + k] + around;
+    }
+}
+
 static int takes_part(const struct placing *p, uint32_t instance, uint32_t chunk, const struct pt_soft_part *part)
 {
     const struct depths *depths = &p->depths[instance][chunk];
-    const uint32_t *rect = p->whole[instance].bounds[chunk].rect, *crop = p->plan->crop;
+    const uint32_t *rect = p->whole[instance].bounds[chunk].rect;
+    uint32_t drawn[4];
+    drawn_rect(p->plan, drawn);
     return depths->before < part->z_to && depths->beyond > part->z_from && rect[1] < part->rows[1] && rect[3] > part->rows[0] &&
-           rect[0] < crop[0] + crop[2] && rect[2] > crop[0];
+           rect[0] < drawn[2] && rect[2] > drawn[0];
 }
 
 static uint64_t records_of(const struct placing *p, uint32_t instance, const struct pt_soft_part *part)
@@ -219,12 +233,13 @@ static int place_part(struct placing *p, struct pt_soft_part part)
 
 static int place_parts(struct placing *p, const float *ends, uint32_t count)
 {
-    const uint32_t *crop = p->plan->crop;
+    uint32_t drawn[4];
     int error = PATINA_OK;
+    drawn_rect(p->plan, drawn);
     p->entries = p->plan->instance_count + p->plan->soft_count;
     p->plan->soft_part_count = 0;
     for (uint32_t k = count + 1; k-- > 0 && !error;) // the farthest first
-        error = place_part(p, (struct pt_soft_part){.rows = {crop[1], crop[1] + crop[3]},
+        error = place_part(p, (struct pt_soft_part){.rows = {drawn[1], drawn[3]},
                                                     .z_from = k ? ends[k - 1] : -1.0f,
                                                     .z_to = k < count ? ends[k] : INFINITY});
     return error;
@@ -251,6 +266,12 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         if (scene->instances[i].style.soft)
             error = place_instance(&p, i);
+    plan->soft_depths[0] = INFINITY;
+    plan->soft_depths[1] = -INFINITY;
+    for (uint32_t i = 0; i < p.seen_count; i++) {
+        plan->soft_depths[0] = fminf(plan->soft_depths[0], p.seen[i].before);
+        plan->soft_depths[1] = fmaxf(plan->soft_depths[1], p.seen[i].beyond);
+    }
     const uint32_t count = error || !plan->soft_count ? 0 : slab_ends(&p, ends);
     if (error || !plan->soft_count || (error = place_parts(&p, ends, count)))
         return error;
@@ -269,7 +290,14 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
 
 // ---- passes --------------------------------------------------------------------------------------------------------------
 
-static const char *const models[] = {"Base", "Concentric", "Express"};
+static const struct {
+    const char *name;
+    uint32_t model;
+} models[] = {[PATINA_SOFT_BASE] = {"Base", PT_SOFT_BASE},
+              [PATINA_SOFT_CONCENTRIC] = {"Concentric", PT_SOFT_CONCENTRIC},
+              [PATINA_SOFT_EXPRESS] = {"Express", PT_SOFT_EXPRESS},
+              [PATINA_SOFT_SPLATS] = {"Splats", PT_SOFT_SPLATS},
+              [PATINA_SOFT_ONE_LAYER] = {"One Layer", PT_SOFT_ONE_LAYER}};
 
 static void plan_gather(struct pt_builder *builder, uint32_t i)
 {
@@ -278,22 +306,29 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
     const patina_cloud_style *style = &instance->instance->style;
     struct gather_args args = {
         .radius_scale = instance->radius_scale, .opacity = style->soft_opacity, .within = 1, .sifted = plan->drawn_words > 0};
-    pt_shade_lights(builder, 0, &args.shade);
+    pt_shade_lights(builder, pt_receives(instance->instance), &args.shade);
     args.shade.view = plan->view;
     args.shade.instance = instance->args;
     args.shade.arrived = 0;
-    args.shade.light_count = instance->args.lit ? args.shade.light_count : 0;
-    pt_plan_recolor(builder, instance, &args.shade);
+    if (plan->map) // colours are of no use
+        args.shade.instance.lit = 0;
+    else
+        pt_plan_recolor(builder, instance, &args.shade);
+    args.shade.light_count = args.shade.instance.lit ? args.shade.light_count : 0;
+    const enum pt_late late = pt_shade_late(&args.shade, PT_LATE_POINTS);
     args.threshold = style->soft == PATINA_SOFT_FIELD ? pt_field_steps(style->soft_threshold) : 0;
     if (style->soft_modulation > 0.0f) // without a field all is 1
         args.weight = style->soft == PATINA_SOFT_FIELD ? fminf(1.0f / (style->soft_modulation * PT_FIELD_MOST), 1.0f)
                                                        : fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
     const enum pt_instance_buffer colors = args.shade.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
-    PT_REASON(PT_ADD(builder, gather, args,
-                     {pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
-                      pt_buffer_of(PT_SURFACE, i), pt_field_of(instance, i), pt_buffer_of(colors, i),
-                      pt_buffer_of(PT_OPACITIES, i), pt_nothing(), args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()}),
-              "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,
+    struct pt_pass *pass =
+        PT_ADD(builder, gather, args,
+               {pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
+                pt_buffer_of(PT_SURFACE, i), pt_field_of(instance, i), pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i),
+                late ? pt_buffer_of(PT_SHADOWS, instance->of) : pt_nothing(),
+                args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()});
+    pass->late = late;
+    PT_REASON(pass, "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,
               args.shade.instance.lit ? "lit" : "unlit");
 }
 
@@ -311,9 +346,7 @@ static struct soft_args part_args(const struct pt_plan *plan, const struct pt_so
     const patina_cloud_style *style = &plan->instances[part->first].instance->style;
     struct soft_args args = {.view = plan->view,
                              .records = part->records,
-                             .model = style->soft_model == PATINA_SOFT_BASE         ? PT_SOFT_BASE
-                                      : style->soft_model == PATINA_SOFT_CONCENTRIC ? PT_SOFT_CONCENTRIC
-                                                                                    : PT_SOFT_EXPRESS,
+                             .model = models[style->soft_model].model,
                              .mu = PT_SOFT_EVEN,
                              .shells = style->soft_shells,
                              .z_from = part->z_from,
@@ -322,8 +355,9 @@ static struct soft_args part_args(const struct pt_plan *plan, const struct pt_so
                              .crop_x = plan->crop[0],
                              .crop_y = plan->crop[1],
                              .crop_width = plan->crop[2]};
-    const uint32_t rect[4] = {plan->crop[0], part->rows[0], plan->crop[0] + plan->crop[2], part->rows[1]};
-    memcpy(args.view.rect, rect, sizeof rect);
+    drawn_rect(plan, args.view.rect);
+    args.view.rect[1] = part->rows[0];
+    args.view.rect[3] = part->rows[1];
     return args;
 }
 
@@ -346,9 +380,10 @@ static void plan_part(struct pt_builder *builder, uint32_t number, enum into int
         PT_ADD(builder, soft, args,
                {into == BETWEEN ? pt_keys_of(builder, 0) : pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0),
                 pt_plane_at(PT_PLANE_SOFT_BINS, 0), pt_plane_if(into != BEFORE, PT_PLANE_SOFT_REACHED, 0),
-                pt_plane_at(into == BEFORE ? PT_PLANE_COMBINED : PT_PLANE_OVER, 0), pt_plane_if(counted, PT_PLANE_DENSITY, 0)}),
+                pt_plane_at(into == BEFORE ? PT_PLANE_COMBINED : PT_PLANE_OVER, 0), pt_plane_if(counted, PT_PLANE_DENSITY, 0),
+                pt_nothing()}),
         "%s %s, part %u of %u, z %.3g to %.3g, rows %u to %u: %u records",
-        models[plan->instances[part->first].instance->style.soft_model], places[into], number + 1, plan->soft_part_count,
+        models[plan->instances[part->first].instance->style.soft_model].name, places[into], number + 1, plan->soft_part_count,
         fmax((double)part->z_from, 0.0), (double)part->z_to, part->rows[0] - plan->crop[1], part->rows[1] - plan->crop[1],
         part->records);
 }
@@ -364,7 +399,7 @@ static void plan_reached(struct pt_builder *builder)
     args.view.rect[3] = plan->crop[1] + plan->crop[3];
     PT_REASON(PT_ADD(builder, soft, args,
                      {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_plane_at(PT_PLANE_SOFT_BINS, 0),
-                      pt_plane_at(PT_PLANE_SOFT_REACHED, 0), pt_plane_at(PT_PLANE_OVER, 0), pt_nothing()}),
+                      pt_plane_at(PT_PLANE_SOFT_REACHED, 0), pt_plane_at(PT_PLANE_OVER, 0), pt_nothing(), pt_nothing()}),
               "how far layer %u reaches", builder->layer);
 }
 
@@ -401,4 +436,41 @@ void pt_plan_soft(struct pt_builder *builder)
     plan->assessed |= (uint32_t)counted << PATINA_PASS_DENSITY;
     for (uint32_t k = 0; k < plan->soft_part_count; k++)
         plan_part(builder, k, BEFORE, counted);
+}
+
+// ---- of lights' maps -----------------------------------------------------------------------------------------------------
+
+static void plan_veil(struct pt_builder *builder, const struct pt_soft_part *part, int last)
+{
+    const struct pt_plan *plan = builder->plan;
+    struct soft_args args = part_args(plan, part, BEFORE);
+    args.model = args.model >= PT_SOFT_SPLATS ? PT_SOFT_EXPRESS : args.model; // what is nearest says nothing of depth
+    args.veils = plan->veils;
+    args.veil_from = plan->soft_depths[0];
+    args.veil_deep = pt_veil_deep(plan);
+    args.last = (uint32_t)last;
+    if (last) {
+        drawn_rect(plan, args.view.rect);
+        args.records = 0;
+    }
+    struct pt_pass *pass = PT_ADD(builder, soft, args,
+                                  {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0),
+                                   pt_plane_at(PT_PLANE_SOFT_BINS, 0), pt_nothing(), pt_nothing(), pt_nothing(),
+                                   pt_plane_at(PT_PLANE_VEIL, 0)});
+    if (last)
+        PT_REASON(pass, "what comes through up to the end of each slab");
+    else
+        PT_REASON(pass, "what %u records take of the light in %u slabs", part->records, plan->veils);
+}
+
+void pt_plan_veil(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    pt_plan_no_veil(builder);
+    pt_plan_sift(builder);
+    for (uint32_t k = 0; k < plan->soft_part_count; k++) {
+        plan_gathers(builder, &plan->soft_parts[k]);
+        plan_veil(builder, &plan->soft_parts[k], 0);
+    }
+    plan_veil(builder, &plan->soft_parts[0], 1);
 }

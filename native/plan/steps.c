@@ -88,6 +88,12 @@ void pt_plan_no_density(struct pt_builder *builder)
     add_clear(builder, pt_plane_at(PT_PLANE_DENSITY, 0), 0, 4, "no soft point is counted");
 }
 
+void pt_plan_no_veil(struct pt_builder *builder)
+{
+    clear_keys(builder, pt_plane_at(PT_PLANE_KEYS, 0), "no surface ends the light");
+    add_clear(builder, pt_plane_at(PT_PLANE_VEIL, 0), 0, 4, "no soft point takes any");
+}
+
 static void nothing_reached(struct pt_builder *builder)
 {
     add_clear(builder, pt_plane_at(PT_PLANE_SOFT_REACHED, 0), 0xBF800000u, 4, "no layer is taken"); // -1
@@ -118,7 +124,9 @@ static void plan_group(struct pt_builder *builder, uint32_t light, uint32_t inde
         PT_REASON(pt_step_at(builder, faint), "points of instance %u have opacities of their own", group->only);
     }
     const uint32_t map = pt_open_step(builder, PT_STEP_MAP);
-    if (group->only != PT_NO_INSTANCE)
+    if (group->soft)
+        PT_REASON(pt_step_at(builder, map), "soft points of instance %u", group->only);
+    else if (group->only != PT_NO_INSTANCE)
         PT_REASON(pt_step_at(builder, map), "instance %u takes %u of 255 parts of light", group->only, group->loss);
     else if (group->without != PT_NO_INSTANCE)
         PT_REASON(pt_step_at(builder, map), "all opaque casters but instance %u, which must not shadow itself", group->without);
@@ -137,7 +145,7 @@ void pt_plan_light_steps(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
-    const size_t most = 2 * (size_t)builder->scene->instance_count + 1;
+    const size_t most = 3 * (size_t)builder->scene->instance_count + 1;
     if (plan->light_count && !plan->groups) {
         if (!(plan->groups = pt_arena_take(&plan->arena, most * sizeof *plan->groups))) {
             builder->failed = PATINA_ERROR_MEMORY;

@@ -34,7 +34,7 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_
         return;
     }
     struct view_args view = pt_view_at(plan, row->slots == PT_SLOTS_LEVELS || row->size == PT_SIZE_TILES ? level : 0);
-    size[0] = view.width;
+    size[0] = view.width * (row->size == PT_SIZE_VEILS ? plan->veils : 1);
     size[1] = view.height * (row->size == PT_SIZE_LIGHTS ? plan->light_count : 1);
 }
 

@@ -548,7 +548,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
         place_mesh(plan, &survey.camera, &scene->meshes[i], (uint32_t)id_base, &plan->meshes[i]);
         id_base += scene->meshes[i].mesh->info.triangle_count;
     }
-    return error || plan->map ? error : pt_place_soft(scene, plan, &survey.camera);
+    return error || (plan->map && !plan->veils) ? error : pt_place_soft(scene, plan, &survey.camera);
 }
 
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,

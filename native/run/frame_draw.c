@@ -58,7 +58,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
     frame->skipped_count = plan->skipped_count;
     shown->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
-    shown->all_lit = !plan->light_count;
+    shown->all_lit = !plan->light_count || !pt_plan_shows(plan);
     shown->has_lines = plan->line_radius > 0.0f;
     shown->assessed = plan->assessed;
     memcpy(shown->crop, plan->crop, sizeof shown->crop);

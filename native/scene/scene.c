@@ -136,7 +136,7 @@ static int too_many(const patina_scene *scene, uint64_t slots, uint64_t count)
 
 static int check_soft(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
 {
-    if (style->soft > PATINA_SOFT_FIELD || style->soft_model > PATINA_SOFT_EXPRESS)
+    if (style->soft > PATINA_SOFT_FIELD || style->soft_model > PATINA_SOFT_ONE_LAYER)
         return fail(scene, "cloud style: no such soft or soft_model");
     if (style->soft_shells > (uint32_t)PT_SOFT_SHELLS)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: %u soft_shells; the most is %u", style->soft_shells,
@@ -162,8 +162,6 @@ static int check_soft(const patina_scene *scene, patina_cloud_style *style, cons
                 "cloud style: soft clouds of a scene are drawn together, and instance %u has another soft_model or soft_shells",
                 i);
     }
-    if (style->soft == PATINA_SOFT_ALL)
-        style->shadow_off = PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE;
     return PATINA_OK;
 }
 

@@ -132,8 +132,8 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
 
 // ---- what they do --------------------------------------------------------------------------------------------------
 
-// Scalars of the attribute by this name.
-static int take_scalars(const patina_file *file, const char *name, patina_cloud *cloud)
+// Numbers of the attribute by this name; what they are for.
+static int read_numbers(const patina_file *file, const char *name, const char *what, uint64_t *count, float **out)
 {
     patina_file_info info = {.struct_size = sizeof info};
     patina_file_attribute attribute = {.struct_size = sizeof attribute};
@@ -145,13 +145,19 @@ static int take_scalars(const patina_file *file, const char *name, patina_cloud 
             break;
     }
     if (code || index == info.attributes) {
-        tool_say("there is no attribute '%s' to make a ramp of", name);
+        tool_say("there is no attribute '%s' to %s", name, what);
         return PATINA_ERROR_ARGUMENT;
     }
-    float *values = malloc(info.count * sizeof *values + 1);
-    if (!values)
-        return PATINA_ERROR_MEMORY;
-    code = patina_file_read_attribute(file, index, values, info.count * sizeof *values);
+    *count = info.count;
+    *out = malloc(info.count * sizeof **out + 1);
+    return *out ? patina_file_read_attribute(file, index, *out, info.count * sizeof **out) : PATINA_ERROR_MEMORY;
+}
+
+static int take_scalars(const patina_file *file, const char *name, patina_cloud *cloud)
+{
+    float *values = NULL;
+    uint64_t count;
+    int code = read_numbers(file, name, "make a ramp of", &count, &values);
     const patina_array scalars = {.data = values, .type = PATINA_FLOAT32, .components = 1};
     if (!code)
         code = patina_cloud_set_scalars(cloud, &scalars);
@@ -170,10 +176,14 @@ static int is_saved(const char *path)
     return read && !memcmp(start, "patina\n\x1a", sizeof start);
 }
 
-static int open_saved(const char *path, const struct tool_color *color, patina_cloud **out)
+static int open_saved(const char *path, const struct tool_color *color, const char *attribute, patina_cloud **out)
 {
     patina_cloud_info info = {.struct_size = sizeof info};
     int code = patina_cloud_open(path, out);
+    if (!code && attribute[0]) {
+        tool_say("there is no attribute '%s' in '%s' to divide soft points by: a built cloud keeps none", attribute, path);
+        code = PATINA_ERROR_ARGUMENT;
+    }
     if (!code)
         code = patina_cloud_get_info(*out, &info);
     if (!code && color->source == PATINA_COLOR_SCALAR && !info.has_scalars) {
@@ -183,17 +193,20 @@ static int open_saved(const char *path, const struct tool_color *color, patina_c
     return code;
 }
 
-int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out,
-                    struct tool_stations *stations, struct tool_scans *scans)
+int tool_load_cloud(const char *path, const struct tool_color *color, const char *attribute, patina_progress *progress,
+                    patina_cloud **out, float **numbers, struct tool_stations *stations, struct tool_scans *scans)
 {
     patina_file *file = NULL;
+    uint64_t count;
     if (is_saved(path))
-        return open_saved(path, color, out);
+        return open_saved(path, color, attribute, out);
     int code = patina_file_open(path, progress, &file);
     if (!code)
         code = patina_file_cloud(file, 0, progress, out);
     if (!code && color->source == PATINA_COLOR_SCALAR)
         code = take_scalars(file, color->attribute, *out);
+    if (!code && attribute[0])
+        code = read_numbers(file, attribute, "divide soft points by", &count, numbers);
     if (!code)
         code = tool_take_stations(file, stations);
     if (!code && scans)

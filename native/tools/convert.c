@@ -63,7 +63,7 @@ static int convert_to_cloud(const char *in, const char *out, const char *attribu
     int code = patina_progress_create(&progress);
     tool_cancellable(progress, NULL);
     if (!code)
-        code = tool_load_cloud(in, &color, progress, &cloud, &stations, NULL);
+        code = tool_load_cloud(in, &color, "", progress, &cloud, NULL, &stations, NULL);
     tool_describe_stations(&stations, &desc);
     desc.free_space = desc.station_count > 1; // one alone sees through nothing
     if (!code)

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_SIZE = 65536, MAX_REPEAT = 100000 };
+enum { MAX_REPEAT = 100000 };
 
 int parse_numbers(const char *text, double *numbers, int least, int most)
 {
@@ -49,7 +49,7 @@ static int parse_size(const char *text, uint32_t *out_width, uint32_t *out_heigh
     char rest;
     if (sscanf(text, "%6ux%6u%c", &width, &height, &rest) != 2)
         return -1;
-    if (!width || !height || width > MAX_SIZE || height > MAX_SIZE)
+    if (!width || !height || width > TOOL_MOST_SIZE || height > TOOL_MOST_SIZE)
         return -1;
     *out_width = width;
     *out_height = height;
@@ -105,7 +105,7 @@ static int parse_region(const char *text, uint32_t region[4])
     if (parse_numbers(text, n, 4, 4) < 0)
         return -1;
     for (int i = 0; i < 4; i++) {
-        if (n[i] < 0 || n[i] > MAX_SIZE || n[i] != floor(n[i]))
+        if (n[i] < 0 || n[i] > TOOL_MOST_SIZE || n[i] != floor(n[i]))
             return -1;
         region[i] = (uint32_t)n[i];
     }
@@ -156,43 +156,6 @@ static int parse_sun(const char *text, struct tool_options *options)
 static int parse_width(const char *text, double *width) { return parse_numbers(text, width, 1, 1) < 0 || *width <= 0 ? -1 : 0; }
 
 enum outcome { GOOD, BAD_VALUE, UNKNOWN };
-
-// MODEL[,FILE...]
-static int parse_soft(const char *text, struct tool_options *options)
-{
-    static const char *const words[] = {"base", "concentric", "express"};
-    const size_t length = strcspn(text, ",");
-    double n[TOOL_OPACITIES];
-    for (uint32_t k = 0; k < 3; k++)
-        if (strlen(words[k]) == length && !memcmp(words[k], text, length))
-            options->soft.model = k + 1;
-    options->soft.file_count = text[length] ? parse_numbers(text + length + 1, n, 1, TOOL_OPACITIES) : 0;
-    for (int i = 0; i < options->soft.file_count; i++) {
-        if (n[i] < 1 || n[i] > MAX_SIZE || n[i] != floor(n[i]))
-            return -1;
-        options->soft.files[i] = (uint32_t)n[i];
-    }
-    return options->soft.model && options->soft.file_count >= 0 ? 0 : -1;
-}
-
-static enum outcome parse_soft_option(const char *name, const char *value, struct tool_options *o)
-{
-    int bad;
-    if (!strcmp(name, "--soft"))
-        return parse_soft(value, o) ? BAD_VALUE : GOOD;
-    if (!strcmp(name, "--soft-shells"))
-        bad = parse_count(value, 1, 64, &o->soft.shells);
-    else if (!strcmp(name, "--soft-radius"))
-        bad = parse_width(value, &o->soft.radius);
-    else if (!strcmp(name, "--soft-opacity"))
-        bad = parse_width(value, &o->soft.opacity) || o->soft.opacity > 1;
-    else if (!strcmp(name, "--soft-modulation"))
-        bad = parse_numbers(value, &o->soft.modulation, 1, 1) < 0 || o->soft.modulation < 0 || o->soft.modulation > 1;
-    else
-        return UNKNOWN;
-    o->soft.shaped = 1;
-    return bad ? BAD_VALUE : GOOD;
-}
 
 // Switches without a value. Returns 0 when name is one.
 static int parse_switch(const char *name, struct tool_options *options)
@@ -357,8 +320,9 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         if (bad > 0)
             bad = tool_parse_color(name, value, &o->color);
         if (bad > 0) {
-            const enum outcome outcome = parse_soft_option(name, value, o);
-            return outcome == UNKNOWN ? parse_line_option(name, value, o) : outcome;
+            bad = tool_parse_soft(name, value, &o->soft);
+            if (bad > 0)
+                return parse_line_option(name, value, o);
         }
     }
     return bad ? BAD_VALUE : GOOD;
@@ -429,11 +393,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("--headlight is one light from the camera: without --sun, --shadows and --panorama");
     if (options->line_options && !options->has_lines)
         return tool_misuse("--line-... options need --lines");
-    if (options->soft.shaped && !options->soft.model)
-        return tool_misuse("--soft-... options need --soft");
-    for (int i = 0; i < options->soft.file_count; i++)
-        if (options->soft.files[i] > (uint32_t)options->file_count)
-            return tool_misuse("--soft: there is no FILE %u", options->soft.files[i]);
+    if (tool_check_soft(&options->soft, options->file_count))
+        return TOOL_USAGE;
     if (options->analysis == TOOL_UNANALYSED &&
         (options->color.free_space || options->color.hidden_kinds || options->color.least_certainty > 0))
         return tool_misuse("--free-space, --hide-kinds and --least-certainty need the analysis");

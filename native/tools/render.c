@@ -16,7 +16,8 @@ struct job {
     patina_device *device;
     patina_device_info device_info;
     patina_progress *progress;
-    patina_cloud **clouds;    // options.file_count
+    patina_cloud **clouds;    // options.file_count, as fields, of those that have one
+    patina_field **fields;
     struct tool_scans *scans; // beside them
     patina_mesh *meshes[TOOL_MESHES];
     patina_scene *scene;
@@ -33,10 +34,13 @@ static void destroy(struct job *job)
     tool_cancellable(NULL, NULL);
     patina_frame_destroy(job->frame);
     patina_scene_destroy(job->scene);
+    for (int i = 0; job->fields && i < job->options.file_count; i++)
+        patina_field_destroy(job->fields[i]);
     for (int i = 0; job->clouds && i < job->options.file_count; i++)
         patina_cloud_destroy(job->clouds[i]);
     for (int i = 0; job->scans && i < job->options.file_count; i++)
         patina_scans_destroy(job->scans[i].made);
+    free(job->fields);
     for (int i = 0; i < job->options.mesh_count; i++)
         patina_mesh_destroy(job->meshes[i]);
     free(job->clouds);
@@ -111,26 +115,14 @@ static int analyse(struct job *job, patina_cloud *cloud, const char *path, const
     return code;
 }
 
-static void set_soft(const struct tool_options *options, int file, patina_cloud_style *style)
-{
-    int soft = options->soft.model && !options->soft.file_count;
-    for (int i = 0; i < options->soft.file_count; i++)
-        soft |= options->soft.files[i] == (uint32_t)file + 1;
-    style->soft = soft ? PATINA_SOFT_ALL : PATINA_SOFT_OFF;
-    style->soft_model = soft ? options->soft.model - 1 : 0;
-    style->soft_shells = options->soft.shells;
-    style->soft_radius = (float)options->soft.radius;
-    style->soft_opacity = (float)options->soft.opacity;
-    style->soft_modulation = (float)options->soft.modulation;
-}
-
 static int load_clouds(struct job *job)
 {
     const struct tool_options *options = &job->options;
     job->box = (struct tool_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     job->clouds = calloc((size_t)options->file_count + 1, sizeof *job->clouds);
     job->scans = calloc((size_t)options->file_count + 1, sizeof *job->scans);
-    int code = job->clouds && job->scans ? patina_progress_create(&job->progress) : PATINA_ERROR_MEMORY;
+    job->fields = calloc((size_t)options->file_count + 1, sizeof *job->fields);
+    int code = job->clouds && job->scans && job->fields ? patina_progress_create(&job->progress) : PATINA_ERROR_MEMORY;
     if (!code)
         code = patina_scene_create(&job->scene);
     if (code)
@@ -151,7 +143,10 @@ static int load_clouds(struct job *job)
     for (int i = 0; i < options->file_count; i++) {
         patina_cloud_info info = {.struct_size = sizeof info};
         struct tool_stations stations = {0};
-        code = tool_load_cloud(options->files[i], &options->color, job->progress, &job->clouds[i], &stations, &job->scans[i]);
+        float *numbers = NULL;
+        code = tool_load_cloud(options->files[i], &options->color,
+                               tool_is_soft(&options->soft, i) ? options->soft.attribute : "", job->progress, &job->clouds[i],
+                               &numbers, &stations, &job->scans[i]);
         if (!code)
             code = analyse(job, job->clouds[i], options->files[i], &stations);
         if (!code && options->pass == PATINA_PASS_DISAGREEMENT && !job->scans[i].made)
@@ -159,6 +154,9 @@ static int load_clouds(struct job *job)
         tool_free_stations(&stations);
         if (!code)
             code = patina_cloud_get_info(job->clouds[i], &info);
+        if (!code)
+            code = tool_set_soft(&options->soft, i, job->clouds[i], numbers, job->progress, &job->fields[i], &style);
+        free(numbers);
         if (code)
             return tool_failed(options->files[i], NULL, code);
         if (!info.count)
@@ -169,7 +167,6 @@ static int load_clouds(struct job *job)
         style.scans = job->scans[i].made;
         if (options->range_culling > 0.0 && !job->scans[i].directed)
             tool_say("warning: %s does not say in which direction its scans were taken: none is left out", options->files[i]);
-        set_soft(options, i, &style);
         code = tool_set_color(&options->color, job->clouds[i], table, &style);
         if (!code)
             code = patina_scene_add_cloud(job->scene, job->clouds[i], &style);

@@ -42,7 +42,7 @@ int tool_cancelled(void);
 enum tool_view { VIEW_ANGLES, VIEW_LOOK };
 enum tool_analysis { TOOL_ANALYSED_WHERE_NEEDED, TOOL_ANALYSED, TOOL_UNANALYSED, TOOL_ANALYSED_BY_GRID };
 
-enum { TOOL_OPACITIES = 64, TOOL_MESHES = 64, TOOL_CLIPS = 64, TOOL_TILES = 65536 };
+enum { TOOL_MOST_SIZE = 65536, TOOL_OPACITIES = 64, TOOL_MESHES = 64, TOOL_CLIPS = 64, TOOL_TILES = 65536 };
 
 // Colours of points and clips.
 struct tool_color {
@@ -58,6 +58,19 @@ struct tool_color {
     patina_clip clips[TOOL_CLIPS];
     int clip_count;
     float tint[4]; // and width; 0: none
+};
+
+// Soft points.
+struct tool_soft {
+    uint32_t model;                 // 0: none is soft; 1 + patina_soft_model
+    uint32_t files[TOOL_OPACITIES]; // which of the files are, from 1 on
+    int file_count;                 // 0: all
+    uint32_t shells;
+    double radius, opacity, modulation, threshold;
+    patina_field_desc field; // without values
+    char attribute[64];      // whose numbers these are; empty: it has none
+    int divided;             // 1: by the field; 2: the threshold is given
+    int shaped;              // one of the options beside --soft is given
 };
 
 struct tool_options {
@@ -79,14 +92,7 @@ struct tool_options {
     double range_gamma, range_pixel; // of range images; 0: automatic
     double range_sharpness;          // 0: one pass
     double range_culling;            // degrees; 0: none
-    struct {
-        uint32_t model;                 // 0: none is soft; 1 + patina_soft_model
-        uint32_t files[TOOL_OPACITIES]; // which of the files are, from 1 on
-        int file_count;                 // 0: all
-        uint32_t shells;
-        double radius, opacity, modulation;
-        int shaped; // one of the four is given
-    } soft;
+    struct tool_soft soft;
     int opacity_count;               // 0: all opaque
     const char *meshes[TOOL_MESHES]; // OBJ files
     int mesh_count;
@@ -126,6 +132,13 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
 int tool_parse_farm(const char *name, const char *value, struct tool_options *options);
 // Whether they go with the others, once all are there; scatters: `patina scatter` asks. A tool_exit.
 int tool_check_farm(struct tool_options *options, int scatters);
+// An option of tool_soft: 0 taken, -1 a bad value, 1 none of them.
+int tool_parse_soft(const char *name, const char *value, struct tool_soft *soft);
+int tool_check_soft(const struct tool_soft *soft, int file_count); // together: a tool_exit
+// Whether points of the file, from 0 on, may be soft; and how. numbers: of the field's attribute, or NULL. *field: the scene needs it.
+int tool_is_soft(const struct tool_soft *soft, int file);
+int tool_set_soft(const struct tool_soft *soft, int file, const patina_cloud *cloud, const float *numbers,
+                  patina_progress *progress, patina_field **field, patina_cloud_style *style);
 
 // An option of tool_color: 0 taken, -1 a bad value, 1 none of them.
 int tool_parse_color(const char *name, const char *value, struct tool_color *color);
@@ -159,8 +172,9 @@ void tool_free_stations(struct tool_stations *stations);
 extern const char *const tool_kinds[6]; // patina_kind
 
 // Each returns a patina_error. table: room for the ramp, read until the cloud is added.
-int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out,
-                    struct tool_stations *stations, struct tool_scans *scans);
+// numbers: of the attribute by that name, in the given order, to be freed; empty: of none. scans: NULL: not asked for.
+int tool_load_cloud(const char *path, const struct tool_color *color, const char *attribute, patina_progress *progress,
+                    patina_cloud **out, float **numbers, struct tool_stations *stations, struct tool_scans *scans);
 int tool_set_color(const struct tool_color *color, const patina_cloud *cloud, float table[PATINA_MAX_RAMP][3],
                    patina_cloud_style *style);
 int tool_add_clips(const struct tool_color *color, patina_scene *scene);

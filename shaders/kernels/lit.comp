@@ -7,6 +7,7 @@
 #include "shared/words.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
+#include "lib/shadow_words.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -117,30 +118,21 @@ bool in_shadow(view_args view, chunk_view chunk, uint at, uint id, out uint pixe
     return until < z && supported(view, column, row, d, z);
 }
 
-// a b / 255 of a, b up to 255, rounded: exact.
-uint share(uint a, uint b)
-{
-    uint product = a * b + 128u;
-    return (product + (product >> 8)) >> 8;
-}
-
 // 3. what the map takes of 255 from a point in the shadow of a texel.
 uint loss_at(uint texel)
 {
     if (args.faint == 0u)
         return args.loss;
     uint id = read_key(texel).x - args.caster;
-    return share(args.loss, opacities[id >> 2] >> 8u * (id & 3u) & 255u);
+    return pt_shadow_share(args.loss, opacities[id >> 2] >> 8u * (id & 3u) & 255u);
 }
 
 // 4. what the sample takes goes into the word. Returns whether the samples so far differ.
 bool note(uint at, uint loss)
 {
-    uint word = words[at], sum = word & PT_SHADOW_SUM, lost = word >> PT_SHADOW_SHIFT;
-    lost += share(255u - lost, loss); // of the light that is left
-    bool whole = args.alone != 0u || args.close != 0u;
-    words[at] = whole ? sum + lost : sum | lost << PT_SHADOW_SHIFT;
-    return whole && sum + lost != args.samples * lost;
+    bool differ;
+    words[at] = pt_shadow_note(words[at], loss, args.alone != 0u || args.close != 0u, args.samples, differ);
+    return differ;
 }
 
 void main()

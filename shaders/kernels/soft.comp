@@ -2,7 +2,8 @@
 // soft: the balls of soft points before each pixel, front to back [S]. SPEC 5, soft; twin of native/device_cpu/kernels/soft.c
 //
 // STEP 0: how many records fall on each tile. Then, for tiles in batches whose lists fit the bins, 1: their lists, in any order;
-// 2: a workgroup sorts a list, by depth and record, so that the order is that of the processor; 3: a workgroup draws a tile.
+// 2: a workgroup sorts a list, by depth and record, so that the order is that of the processor; 3: a workgroup draws a tile, or
+// (VEIL, of a light's view) adds up what its rays lose.
 // No invocation takes more than about 50,000 steps through its loops, since llvmpipe ends them at 65,535: long lists are sorted a
 // round at a time, and drawn in parts, with what pixels have come to in between.
 #version 430 core
@@ -27,6 +28,7 @@ layout(std430, binding = BIND_bins) coherent buffer bins_block {
 layout(std430, binding = BIND_reached) buffer reached_block { float reached[]; };
 layout(std430, binding = BIND_target) buffer target_block { vec4 target[]; };
 layout(std430, binding = BIND_density) buffer density_block { float density[]; };
+layout(std430, binding = BIND_veil) buffer veil_block { float veil[]; };
 layout(std430, binding = BIND_counts) buffer counts_block { uint counts[]; };          // of each tile
 layout(std430, binding = BIND_begins) readonly buffer begins_block { uint begins[]; }; // of the batch's lists, by tile; and where the last ends
 
@@ -40,12 +42,15 @@ uint group() { return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x; 
 
 #if STEP < 2
 
+// Of a light's view all are balls.
+bool of_discs() { return PT_SOFT_DISCS(args.model) && args.veils == 0u; }
+
 // Ends of a ball or a disc on screen along one axis: ray of the centre, in units of the axis.
 vec2 ends_of(float ray, float ratio, float begin, float step_size)
 {
     float scale = pt_rcp(step_size);
     precise float slope = ray * ray + 1.0;
-    if (args.model == PT_SOFT_EXPRESS) {
+    if (of_discs()) {
         precise float wide = ratio * (slope * pt_rsqrt(slope));
         precise vec2 ends = vec2((ray - wide - begin) * scale, (ray + wide - begin) * scale);
         return ends;
@@ -62,7 +67,7 @@ bool box_of(vec4 p, out uvec4 box)
     view_args view = args.view;
     bool good = true; // of others the eye may stand in the ball: it is everywhere
     float r = 1.0;
-    if (view.perspective != 0u && args.model != PT_SOFT_EXPRESS) {
+    if (view.perspective != 0u && !of_discs()) {
         precise float wide = 1.001 * p.w;
         good = wide < p.z;
     }
@@ -70,7 +75,7 @@ bool box_of(vec4 p, out uvec4 box)
         r = pt_rcp(good ? p.z : 1.0);
     float begin[2] = float[2](view.ray_x0, view.ray_y0), step_size[2] = float[2](view.ray_xs, view.ray_ys), center[2] = float[2](p.x * r, p.y * r);
     int origin[2] = int[2](view.origin_x, view.origin_y);
-    bool some = true;
+    bool some = view.perspective == 0u || !of_discs() || PT_SOFT_BEFORE < p.z; // else it lies behind the eye
     for (int k = 0; k < 2; k++) {
         float low = float(origin[k] + int(view.rect[k])), high = float(origin[k] + int(view.rect[2 + k]));
         precise vec2 ends;
@@ -167,12 +172,38 @@ layout(std430, binding = BIND_unfinished) buffer unfinished_block { uint unfinis
 
 shared uint shared_fragments;
 
-#if MODEL == PT_SOFT_EXPRESS
+// (cos(pi sqrt(q)) + 1) / 2, for q in 0..1.
+float cosine_of(float q)
+{
+    precise float f = PT_SOFT_COSINE_5 * q + PT_SOFT_COSINE_4;
+    f = f * q + PT_SOFT_COSINE_3;
+    f = f * q + PT_SOFT_COSINE_2;
+    f = f * q + PT_SOFT_COSINE_1;
+    f = f * q + PT_SOFT_COSINE_0;
+    f = f * q + 1.0;
+    return f;
+}
+
+// [S Eq. 22] of that.
+float share_of(float weight, float q, float cosine)
+{
+    precise float share = cosine;
+    if (weight < 1.0) {
+        float root = q * pt_rsqrt(pt_max(q, 1e-20));
+        share = (1.0 - root) * (1.0 - weight) + cosine * weight;
+    }
+    return share;
+}
+
+#if PT_SOFT_DISCS(MODEL) && !VEIL
 
 #define DISCS 256u // of a workgroup's round
 shared vec4 places[DISCS]; // x, y, z, opacity
 shared vec4 shapes[DISCS]; // q = (a dx + b dy) dx + c dy^2; weight
 shared vec4 looks[DISCS];  // colour; density
+#if MODEL != PT_SOFT_EXPRESS
+shared float radii[DISCS];
+#endif
 shared uint open;
 
 // 1. A disc: place from the middle of the tile's first pixel.
@@ -201,7 +232,15 @@ void set_disc(view_args view, uint k, uint record, ivec2 corner)
     places[k] = vec4(off, p.z, opacity);
     shapes[k] = vec4(shape, weight);
     looks[k] = vec4(look.xyz, shared_out);
+#if MODEL != PT_SOFT_EXPRESS
+    radii[k] = p.w;
+#endif
 }
+
+#if !VEIL
+#if MODEL == PT_SOFT_EXPRESS
+
+bool takes(uint first, pixel own) { return PT_SOFT_SPENT <= own.through || args.density != 0u; }
 
 // 2. What it takes of a pixel's light.
 void add_disc(uint k, vec2 here, inout pixel own)
@@ -213,27 +252,67 @@ void add_disc(uint k, vec2 here, inout pixel own)
     bool open_here = PT_SOFT_SPENT <= own.through;
     if (!(q < 1.0 && (open_here || args.density != 0u) && own.from < place.z && place.z <= own.to))
         return;
-    precise float f = PT_SOFT_COSINE_5 * q + PT_SOFT_COSINE_4;
-    f = f * q + PT_SOFT_COSINE_3;
-    f = f * q + PT_SOFT_COSINE_2;
-    f = f * q + PT_SOFT_COSINE_1;
-    f = f * q + PT_SOFT_COSINE_0;
-    f = f * q + 1.0;
+    float f = cosine_of(q);
     precise float sum = own.density + look.w * f;
     own.density = sum;
     if (!open_here)
         return;
-    precise float share = f;
-    if (shape.w < 1.0) {
-        float root = q * pt_rsqrt(pt_max(q, 1e-20));
-        share = (1.0 - root) * (1.0 - shape.w) + f * shape.w;
-    }
+    float share = share_of(shape.w, q, f);
     precise float part = own.through * (share * place.w), through = own.through - part;
     precise vec3 color = own.color + part * look.xyz;
     own.through = through;
     own.color = color;
     own.fragments++;
 }
+
+void finish(inout pixel own) {}
+
+#else
+
+// first: record of the nearest disc that may come.
+bool takes(uint first, pixel own)
+{
+    return !(0.0 < own.lost && own.place < records[2u * first].z) || args.density != 0u;
+}
+
+// 2. What of it belongs to a pixel's surface, which ends at own.place; lost, left_out: sums of weights and opacities.
+void add_disc(uint k, vec2 here, inout pixel own)
+{
+    vec4 place = places[k], shape = shapes[k], look = looks[k];
+    precise float dx = place.x - here.x, dy = place.y - here.y;
+    precise float q = (shape.x * dx + shape.y * dy) * dx + shape.z * (dy * dy);
+    q = pt_max(q, 0.0);
+    if (!(q < 1.0 && own.from < place.z && place.z <= own.to))
+        return;
+    float f = cosine_of(q);
+    precise float weight = f + PT_SOFT_RIM;
+    precise float density_sum = own.density + look.w * f;
+    own.density = density_sum;
+    bool first = !(0.0 < own.lost);
+    if (!(first || place.z <= own.place))
+        return;
+    precise float end = place.z + radii[k], sum = own.lost + weight, opacities = own.left_out + weight * place.w;
+    precise vec3 color = own.color + weight * look.xyz;
+    own.place = first ? end : own.place;
+    own.lost = sum;
+    own.left_out = opacities;
+    own.color = color;
+    own.fragments++;
+}
+
+void finish(inout pixel own)
+{
+    if (!(0.0 < own.lost))
+        return;
+    precise float share = 1.0 / own.lost;
+    precise float opacity = MODEL == PT_SOFT_SPLATS ? 1.0 : own.left_out * share;
+    precise float scale = opacity * share, through = 1.0 - opacity;
+    precise vec3 color = own.color * scale;
+    own.color = color;
+    own.through = through;
+}
+
+#endif
 
 void draw(view_args view, uint begin, uint count, ivec2 corner, bool inside, inout pixel own)
 {
@@ -244,7 +323,7 @@ void draw(view_args view, uint begin, uint count, ivec2 corner, bool inside, ino
         if (lane == 0u)
             open = 0u;
         barrier();
-        if (inside && (PT_SOFT_SPENT <= own.through || args.density != 0u) && own.from < own.to)
+        if (inside && takes(lists[begin + i].x, own) && own.from < own.to)
             atomicOr(open, 1u);
         if (i + lane < end)
             set_disc(view, lane, lists[begin + i + lane].x, corner);
@@ -256,11 +335,17 @@ void draw(view_args view, uint begin, uint count, ivec2 corner, bool inside, ino
         barrier();
     }
     own.unfinished = inside && end < count;
+    if (inside && end == count)
+        finish(own);
 }
+
+#endif
 
 #else
 
 #include "lib/soft.glsl"
+
+#if !VEIL
 
 shared uint widest; // radius in the list
 
@@ -395,7 +480,12 @@ void draw(view_args view, uint begin, uint count, ivec2 corner, bool inside, ino
     }
 }
 
-#endif
+#endif // VEIL
+#endif // MODEL
+
+#if VEIL
+#include "lib/veil.glsl"
+#else
 
 void save(view_args view, uvec2 here, pixel own)
 {
@@ -477,4 +567,5 @@ void main()
     }
 }
 
+#endif // VEIL
 #endif

@@ -17,12 +17,17 @@
 #define PT_SOFT_SPENT 0.000244140625f // 2^-12: what lies behind is not looked at; a quarter of a step of 10 bits
 #define PT_SOFT_TILE 16u
 #define PT_SOFT_PART 16384u // OpenGL: steps through a list from one dispatch to the next
+#define PT_SOFT_VEILS 32u     // slabs of depth of a light's view, at most
 #define PT_SOFT_FARTHEST 1e30f // a place beyond is none
 #define PT_SOFT_WIDEST 1e18f   // no radius is more
 #define PT_SOFT_BEFORE 1e-30f  // z of what is before the eye; what is not is lit as if it lay on the view's axis
 #define PT_SOFT_EXPRESS 0u // models
 #define PT_SOFT_CONCENTRIC 1u
 #define PT_SOFT_BASE 2u
+#define PT_SOFT_SPLATS 3u
+#define PT_SOFT_ONE_LAYER 4u
+#define PT_SOFT_MODELS 5u
+#define PT_SOFT_DISCS(model) ((model) == PT_SOFT_EXPRESS || (model) >= PT_SOFT_SPLATS)
 #define PT_SOFT_EVEN 0u // weights of shells: r / N, which come to the Base model's density
 #define PT_SOFT_EQ13 1u
 #define PT_SOFT_EQ15 2u
@@ -35,6 +40,7 @@
 #define PT_SOFT_COSINE_3 0.117583841f
 #define PT_SOFT_COSINE_4 -0.0127442228f
 #define PT_SOFT_COSINE_5 0.000819474808f
+#define PT_SOFT_RIM 1e-2f // Splats, One Layer: more weight than the cosine, so that where all are at their rims rounding decides nothing
 #define PT_SOFT_DISC 1.0704707f      // 1 / the integral of (cos(pi r) + 1) / 2 over the unit disc, pi / 2 - 2 / pi
 #define PT_SOFT_BALL 0.95492965855f  // 3 / pi: 1 / the integral of 1 - r over the unit ball
 
@@ -51,8 +57,14 @@
 //   same divided by the sum of mu 2 r_i / r at the centre.
 // Express [S 3.3]: one piece a ball, at its centre's z: an ellipse on screen, that of a disc across the ray to the centre: with
 //   n, u, v of that ray q = ((dx^2 + dy^2) - (dx u + dy v)^2 / n) (z/r)^2, dx, dy in units of u, v; opacity a (cos(pi sqrt(q)) + 1) / 2.
+// Splats, One Layer: the same discs, for comparison. Of a pixel those up to a radius of the nearest one's behind that one are its
+//   surface, and no other counts: colour and opacity are means with the weights (cos(pi sqrt(q)) + 1) / 2 + PT_SOFT_RIM; Splats: opacity 1.
 // Equal z go by record. A pixel whose light falls below PT_SOFT_SPENT takes no more.
 // density: points per square of the world's unit across the ray, each shared out over its ball (Express: over its disc).
+// veils: of a light's view, and nothing is drawn: what -ln of the light that comes through grows by in each of so many slabs of
+//   depth, veil_from + k veil_deep on, the first and the last without end; added to what is there. Base and Concentric: sum m lambda I
+//   within the slab; Express, and what stands for it: -ln(1 - a (cos(pi d) + 1) / 2), evenly over the ray's 2 r about where it is
+//   nearest to the centre. With `last` and no records slabs become sums of all up to their ends.
 struct soft_args {
     struct view_args view;  // rect: the pixels that are written
     uint32_t records;       // how many there may be, drawn or not
@@ -64,6 +76,8 @@ struct soft_args {
     uint32_t last;          // layered: the keys' z becomes the reached one, where it lies beyond that
     uint32_t crop_x, crop_y, crop_width; // of density, and of target unless layered
     uint32_t density;       // 0: none; 1: written; 2: added to
+    uint32_t veils;         // 0, or 1..PT_SOFT_VEILS
+    float veil_from, veil_deep; // z; veil_deep > 0
 };
 
 // gather: the soft points of an instance become records, lit as shade lights them.

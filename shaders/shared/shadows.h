@@ -43,6 +43,17 @@ struct lit_args {
     uint32_t faint, caster; // caster: first id of the only cloud that casts
 };
 
+// dim: points behind the soft points of a light's view, SPEC 5. -ln of the light that comes through is that of the veil plane's texels
+// around, between their middles, and between the ends of the slab that the point lies in. Points outside the window or before z_near
+// take all light.
+struct dim_args {
+    struct view_args view; // of the map
+    float window[4];       // as in lit_args, as are these:
+    uint32_t base, alone, close, samples, compare, marked;
+    uint32_t veils;        // slabs of the plane
+    float veil_from, veil_scale; // as in soft_args; 1 / veil_deep
+};
+
 // limit: what a map's next layer sees lies beyond z + deff[from]; +inf (nothing does) where the map is empty, or the point that it
 // shows takes all light: opacity and loss are 255.
 struct limit_args {

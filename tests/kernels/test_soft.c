@@ -267,7 +267,7 @@ static void run(struct harness *h, struct setup *s, enum check check)
                      *before = harness_buffer(h, reached, 4 * s->pixels);
     struct pt_buffer *into = harness_buffer(h, target, 16 * s->pixels),
                      *density = harness_buffer(h, harness_alloc(h, 4 * s->pixels), 4 * s->pixels);
-    HARNESS_RUN(h, soft, &s->args, keys, records, bins, before, into, density);
+    HARNESS_RUN(h, soft, &s->args, keys, records, bins, before, into, density, NULL);
     const float *got = harness_read(h, into), *sums = harness_read(h, density), *went = harness_read(h, before);
     const double peak = densest(s);
     double worst = 0.0;
@@ -398,6 +398,111 @@ static void inside(struct harness *h)
         }
 }
 
+// ---- splats, one layer -------------------------------------------------------------------------------------------------------
+
+// Random discs: what is nearest, and a radius of that behind it.
+static void splats(struct harness *h)
+{
+    for (uint32_t model = PT_SOFT_SPLATS; model <= PT_SOFT_ONE_LAYER; model++)
+        for (int perspective = 0; perspective < 2; perspective++)
+            for (uint32_t layered = 0; layered < 3; layered++) {
+                struct rng rng = {5 + model + 4 * layered};
+                struct setup s = look_at(h, &rng, 67, 45, perspective, model, 300);
+                s.args.layered = layered;
+                s.args.last = layered == 1;
+                run(h, &s, EVERYTHING);
+            }
+}
+
+// One disc: its own colour all over it, opaque or as faint as it is; of two the farther one shows where it lies beyond a radius.
+static void nearest(struct harness *h)
+{
+    struct ref_ball balls[2] = {{.z = 3.0, .r = 0.5, .square = 0.3, .a = 0.4, .w = 1.0, .color = {1.0, 0.5, 0.0}},
+                                {.z = 3.6, .r = 0.5, .square = 0.0, .a = 0.9, .w = 1.0, .color = {0.0, 0.0, 1.0}, .record = 1}};
+    struct ref_soft is = ref_soft_splats(balls, 2, 0, 0.0, 9.0);
+    HARNESS_CHECK(h, is.through == 0.0 && harness_near(is.color[0], 1.0, 1e-12) && harness_near(is.color[2], 0.0, 1e-12));
+    is = ref_soft_splats(balls, 2, 1, 0.0, 9.0);
+    HARNESS_CHECK(h, harness_near(is.through, 0.6, 1e-12) && harness_near(is.color[1], 0.2, 1e-12));
+    balls[1].z = 3.4;
+    is = ref_soft_splats(balls, 2, 0, 0.0, 9.0);
+    HARNESS_CHECK(h, is.fragments == 2 && is.color[2] > 0.5);
+}
+
+// ---- of a light's view ---------------------------------------------------------------------------------------------------------
+
+// Random balls in slabs, in two passes: added up, and then summed. Of each texel and slab -ln of what comes through to its end.
+static void check_veils(struct harness *h, struct setup *s, uint32_t veils)
+{
+    const size_t count = s->pixels * veils;
+    const float ends[2] = {s->args.z_from, s->args.z_to};
+    float *none = harness_alloc(h, 4 * count);
+    double worst = 0.0;
+    memset(none, 0, 4 * count);
+    s->args.veils = veils;
+    s->args.veil_from = 1.5f;
+    s->args.veil_deep = 7.0f / (float)veils;
+    const size_t room = 64 + 32 * (size_t)s->args.records;
+    struct pt_buffer *keys = harness_buffer(h, s->keys, 8 * s->pixels);
+    struct pt_buffer *records = harness_buffer(h, s->records, 4 * PT_SOFT_WORDS * (size_t)s->args.records);
+    struct pt_buffer *bins = harness_buffer(h, harness_alloc(h, room), room), *veil = harness_buffer(h, none, 4 * count);
+    for (int half = 0; half < 2; half++) { // parts: before z = 5, and behind it
+        s->args.z_from = half ? 5.0f : ends[0];
+        s->args.z_to = half ? ends[1] : 5.0f;
+        HARNESS_RUN(h, soft, &s->args, keys, records, bins, NULL, NULL, NULL, veil);
+    }
+    struct soft_args whole = s->args;
+    whole.z_from = ends[0];
+    whole.records = 0;
+    whole.last = 1;
+    HARNESS_RUN(h, soft, &whole, keys, records, bins, NULL, NULL, NULL, veil);
+    const float *got = harness_read(h, veil);
+    whole.records = s->args.records;
+    for (size_t i = 0; i < s->pixels; i++)
+        for (uint32_t k = 0; k < veils; k++) {
+            const double end = k + 1 == veils ? INFINITY : (double)s->args.veil_from + (k + 1.0) * (double)s->args.veil_deep;
+            const double expected = ref_soft_veil(&whole, s->records, (int)(i % s->args.view.width),
+                                                  (int)(i / s->args.view.width), end);
+            worst = fmax(worst, fabs(exp(-expected) - exp(-(double)got[i * veils + k])));
+            if (!harness_near(exp(-(double)got[i * veils + k]), exp(-expected), 1e-3) ||
+                !harness_near(got[i * veils + k], expected, 1e-3 + 1e-3 * expected))
+                harness_fail(h, "veil", (int)(i % s->args.view.width), (int)(i / s->args.view.width),
+                             "slab %u: got %.9g, expected %.9g", k, (double)got[i * veils + k], expected);
+        }
+    harness_note(h, "light off by %.2g at most", worst);
+}
+
+static void veils(struct harness *h)
+{
+    static const uint32_t counts[] = {PT_SOFT_VEILS, 7, 1};
+    for (uint32_t model = 0; model < 3; model++)
+        for (int perspective = 0; perspective < 2; perspective++)
+            for (int k = 0; k < 3; k++) {
+                struct rng rng = {31 + model + 4 * (uint32_t)k};
+                struct setup s = look_at(h, &rng, 37, 23, perspective, model, 120);
+                check_veils(h, &s, counts[k]);
+            }
+}
+
+// The light stands in a ball; and 3000 balls over one texel, as faint as 4e-4.
+static void veils_at_ends(struct harness *h)
+{
+    const double white[3] = {1.0, 1.0, 1.0};
+    for (uint32_t model = 0; model < 3; model++) {
+        struct rng rng = {37};
+        struct setup s = look_at(h, &rng, 33, 17, 1, model, 16);
+        put(&s, 0, s.args.view.origin_x + 10.0, s.args.view.origin_y + 4.0, 0.3, 2.0, 0.7, 1.0, white);
+        check_veils(h, &s, 16);
+        s = look_at(h, &rng, 2, 1, 1, model, 3000);
+        for (uint32_t i = 0; i < 3000; i++) {
+            const double z = rng_range(&rng, 2.0, 8.0);
+            put(&s, i, s.args.view.origin_x + 1.0, s.args.view.origin_y + 0.5, z, 0.7 * ref_footprint(&s.args.view, z), 4e-4, 1.0,
+                white);
+        }
+        s.args.shells = 3;
+        check_veils(h, &s, 9);
+    }
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
@@ -411,6 +516,10 @@ int main(int argc, char **argv)
         {"empty tiles", empty_tiles, 0},
         {"scales from 1e-3 to 1e3", scales, 0},
         {"the eye inside", inside, 0},
+        {"splats and one layer", splats, 0},
+        {"what is nearest", nearest, 1},
+        {"slabs of a light's view", veils, 0},
+        {"slabs, the light inside, many balls", veils_at_ends, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

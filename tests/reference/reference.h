@@ -454,9 +454,22 @@ struct ref_soft ref_soft_ray(const struct ref_ball *balls, uint32_t count, const
                              double to);
 struct ref_soft ref_soft_discs(struct ref_ball *balls, uint32_t count, double from, double to);
 
+struct ref_soft ref_soft_splats(struct ref_ball *balls, uint32_t count, int one_layer, double from, double to);
+
 struct ref_ball ref_ball_at(const struct soft_args *args, const uint32_t *records, uint32_t index, int x, int y);
 // A pixel: reached is that of its plane, z its key's.
 struct ref_soft ref_soft(const struct soft_args *args, const uint32_t *records, int x, int y, double reached, double z);
+
+// -ln of the light that comes through along the pixel's ray up to z, of the slabs' model.
+double ref_soft_veil(const struct soft_args *args, const uint32_t *records, int x, int y, double z);
+
+// ---- dim.c ------------------------------------------------------------------------------------------------------------------
+
+// -ln of the light that comes to a place in the map; what of 255 a point loses, from least to most. REF_NO: nothing, for it lies
+// outside; REF_UNSURE: float32 may find it there.
+double ref_dim_at(const struct dim_args *args, const float *veil, double x, double y, double z);
+enum ref_truth ref_dim(const struct dim_args *args, const float *veil, const struct chunk_view *chunk, const float *positions,
+                       uint32_t slot, double loss[2]);
 
 // ---- gather.c ---------------------------------------------------------------------------------------------------------------
 

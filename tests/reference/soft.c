@@ -132,6 +132,33 @@ struct ref_soft ref_soft_discs(struct ref_ball *balls, uint32_t count, double fr
     return out;
 }
 
+struct ref_soft ref_soft_splats(struct ref_ball *balls, uint32_t count, int one_layer, double from, double to)
+{
+    struct ref_soft out = {.through = 1.0};
+    double end = 0.0, weights = 0.0, opacity = 0.0;
+    qsort(balls, count, sizeof *balls, nearer);
+    for (uint32_t i = 0; i < count; i++) {
+        const struct ref_ball *b = &balls[i];
+        if (!(b->square < 1.0) || !(from < b->z && b->z <= to))
+            continue;
+        const double weight = ref_soft_disc(b->square, 1.0, 1.0) + (double)PT_SOFT_RIM;
+        out.density += (double)PT_SOFT_DISC / (b->r * b->r) * ref_soft_disc(b->square, 1.0, 1.0);
+        end = weights > 0.0 ? end : b->z + b->r;
+        if (b->z > end)
+            continue;
+        weights += weight;
+        opacity += weight * b->a;
+        for (int c = 0; c < 3; c++)
+            out.color[c] += weight * b->color[c];
+        out.fragments++;
+    }
+    const double alpha = !(weights > 0.0) ? 0.0 : one_layer ? opacity / weights : 1.0;
+    for (int c = 0; c < 3 && weights > 0.0; c++)
+        out.color[c] *= alpha / weights;
+    out.through = 1.0 - alpha;
+    return out;
+}
+
 struct ref_ball ref_ball_at(const struct soft_args *args, const uint32_t *records, uint32_t index, int x, int y)
 {
     const struct view_args *view = &args->view;
@@ -194,10 +221,35 @@ struct ref_soft ref_soft(const struct soft_args *args, const uint32_t *records, 
         balls[count] = ref_ball_at(args, records, i, x, y);
         count += balls[count].d < 1.5 || balls[count].square < 1.5;
     }
-    if (balls && args->model == PT_SOFT_EXPRESS)
+    if (balls && args->model >= PT_SOFT_SPLATS)
+        out = ref_soft_splats(balls, count, args->model == PT_SOFT_ONE_LAYER, from, to);
+    else if (balls && args->model == PT_SOFT_EXPRESS)
         out = ref_soft_discs(balls, count, from, to);
     else if (balls)
         out = ref_soft_ray(balls, count, &model, root * fmax(from, (double)view->z_near), root * to);
     free(balls);
     return out;
+}
+
+double ref_soft_veil(const struct soft_args *args, const uint32_t *records, int x, int y, double z)
+{
+    const struct view_args *view = &args->view;
+    const struct ref_soft_model model = {args->model, args->mu};
+    const double px = view->origin_x + x + 0.5, py = view->origin_y + y + 0.5;
+    const double u = (double)view->ray_x0 + (double)view->ray_xs * px, v = (double)view->ray_y0 + (double)view->ray_ys * py;
+    const double root = view->perspective ? sqrt(1.0 + u * u + v * v) : 1.0;
+    const double from = fmax((double)args->z_from, (double)view->z_near), to = fmin((double)args->z_to, z);
+    double sum = 0.0;
+    for (uint32_t i = 0; i < args->records; i++) {
+        const struct ref_ball ball = ref_ball_at(args, records, i, x, y);
+        if (args->model == PT_SOFT_EXPRESS) {
+            const double low = fmin(fmax((root * from - ball.along + ball.r) / (2.0 * ball.r), 0.0), 1.0),
+                         high = fmin(fmax((root * to - ball.along + ball.r) / (2.0 * ball.r), 0.0), 1.0);
+            if (ball.d < 1.0)
+                sum -= log1p(-fmin(ref_soft_disc(ball.d * ball.d, ball.a, ball.w), (double)PT_SOFT_FULLEST)) * fmax(high - low, 0.0);
+        } else if (ball.d < 1.0 && from < to) {
+            sum -= log(ref_soft_ray(&ball, 1, &model, root * from, root * to).through);
+        }
+    }
+    return sum;
 }

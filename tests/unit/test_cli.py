@@ -348,6 +348,67 @@ def test_pixel_samples():
         assert run("render", "soft.ply", "-o", "no.png", "--pixel-samples", bad, code=2)
 
 
+def test_soft():
+    """A wall whose columns have rising numbers, left dark and of class 2, right bright and of class 6, before a green one: what is soft
+    lets the green through, by every field; and the modes to compare with."""
+    step = 2 / 119
+    rows = ["x,y,z,red,green,blue,classification,rise"]
+    rows += [f"{x * step - 1},0,{z * step - 1},{40 if x < 60 else 255},0,0,{2 if x < 60 else 6},{10 * x}" for x in range(120) for z in range(120)]
+    (FOLDER / "soft.csv").write_text("\n".join(rows))
+    wall("green.ply", lambda x, z: (0, 255, 0), y=0.5)
+    view = ["--size", "64x64", "--look", "0,-3,0,0,0,0", "--unlit", "--background", "0,0,0", "-o", "soft.png"]
+    style = ["--soft-opacity", "0.1", "--soft-radius", "0.03"]
+
+    def at(*arguments):
+        run("render", "soft.csv", "green.ply", *view, *arguments)
+        rows = read_png("soft.png")[3]
+        return [rows[32][x] for x in (16, 48)]
+
+    def soft(*arguments):
+        return [pixel[1] > 60 for pixel in at("--soft", "express,1", *style, *arguments)]
+
+    assert not any(pixel[1] > 60 for pixel in at()) and soft() == [True, True]
+    assert soft("--soft-field", "rise") == [False, True] and soft("--soft-field", "rise,1190,0") == [True, False]
+    assert soft("--soft-field", "rise,0,1190", "--soft-threshold", "0.1") == [True, True]
+    assert soft("--soft-field", "rise,0,1190", "--soft-threshold", "0.95") == [False, False]
+    assert soft("--soft-field", "luminance", "--soft-threshold", "0.1") == [False, True]
+    assert soft("--soft-field", "class:6,7") == [False, True]
+    assert soft("--soft-field", "point:-1,0,0,0,2") == [False, True]
+    assert soft("--soft-field", "plane:0,0,0,2,0,0,-1,1") == [False, True]
+    assert soft("--soft-field", "axis:1,0,0,0,0,1,2,0") == [False, True]
+    for word in ("density", "uncertainty"):  # even points: all or none, and both pictures come
+        soft("--soft-field", word)
+        soft("--soft-field", f"{word},0,1e9", "--soft-threshold", "0.5")
+    assert all(pixel[1] < 30 and pixel[0] > 30 for pixel in at("--soft", "sp,1", *style)), "splats are opaque"
+    through = at("--soft", "olt,1", *style)
+    assert all(pixel[1] > 200 > 1 < pixel[0] for pixel in through), "a layer of a tenth"
+    assert "no attribute 'height'" in run("render", "soft.csv", *view, "--soft", "base", "--soft-field", "height", code=1).stderr
+    for bad in (["--soft", "volume"], ["--soft-field", "rise"], ["--soft", "base", "--soft-threshold", "0.5"],
+                ["--soft", "base", "--soft-field", "class:x"], ["--soft", "base", "--soft-field", "plane:0,0,0"],
+                ["--soft", "base", "--soft-field", "axis:0,0,0,0,0,0"], ["--soft", "base", "--soft-field", "rise,1"],
+                ["--soft", "base", "--soft-field", "rise", "--soft-threshold", "2"]):
+        run("render", "soft.csv", *view, *bad, code=2)
+
+
+def test_soft_shadows():
+    """A soft ball over a floor dims it under a sun, and less than a solid one; without shadows it does not."""
+    rows = [f"{x / 30 - 2},{y / 30 - 2},-1,200,200,200" for x in range(120) for y in range(120)]
+    (FOLDER / "floor.csv").write_text("x,y,z,red,green,blue\n" + "\n".join(rows))
+    ball("over.ply", count=4000)
+    view = ["--size", "64x64", "--look", "0,-3,9,0,0,-1", "--lit", "--sun", "90,60", "-o", "shade.png"]
+
+    def light(*arguments):
+        run("render", "floor.csv", "over.ply", *view, *arguments)
+        return sum(sum(pixel[:3]) for row in read_png("shade.png")[3] for pixel in row)
+
+    style = ["--soft-opacity", "0.1", "--soft-radius", "0.1"]
+    bare, soft, solid = light("--soft", "base,2", *style), light("--soft", "base,2", *style, "--shadows"), light("--shadows")
+    denser = light("--soft", "base,2", "--soft-radius", "0.1", "--soft-opacity", "0.4", "--shadows")
+    assert soft < 0.995 * bare and denser < soft, (bare, soft, denser, solid)
+    assert "run  dim" in run("render", "floor.csv", "over.ply", *view, "--soft", "base,2", "--shadows", "--dump-plan").stdout
+    assert "run  dim" not in run("render", "floor.csv", "over.ply", *view, "--shadows", "--dump-plan").stdout
+
+
 def test_noise():
     """Samples end where the picture is as good as was asked for; the planes beside it are of one sample."""
     ball("noisy.ply")

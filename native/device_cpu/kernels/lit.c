@@ -2,7 +2,7 @@
 // lit: points against the filled map of a light. [D 6], SPEC 4; twin of shaders/kernels/lit.comp
 //
 // Words of a cloud's points belong to one chunk each, so threads never meet. Lit points are not written at all.
-#include "device_cpu/rows.h"
+#include "lit_words.h"
 #include "shared/shadows.h"
 
 struct lit {
@@ -152,13 +152,6 @@ static uint32_t in_shadow(const struct lit *lit, const struct fall *f, vi id)
     return vm_bits(supported(&around, d, f->z, dark));
 }
 
-// a b / 255 of a, b up to 255, rounded: exact.
-static inline uint32_t share(uint32_t a, uint32_t b)
-{
-    uint32_t product = a * b + 128;
-    return (product + (product >> 8)) >> 8;
-}
-
 // 3. what the map takes of 255 from a point in the shadow of a texel.
 static inline uint32_t loss_at(const struct lit *lit, uint32_t texel)
 {
@@ -166,20 +159,7 @@ static inline uint32_t loss_at(const struct lit *lit, uint32_t texel)
         return lit->args.loss;
     const uint32_t *keys = PT_DATA(lit->call, lit, keys); // low words: ids
     const uint8_t *opacities = PT_DATA(lit->call, lit, opacities);
-    return share(lit->args.loss, opacities[keys[2 * (size_t)texel] - lit->args.caster]);
-}
-
-// 4. what the sample takes goes into the word. Returns whether the samples so far differ.
-static inline uint32_t note(const struct lit_args *args, uint32_t *word, uint32_t loss)
-{
-    uint32_t sum = *word & PT_SHADOW_SUM, lost = *word >> PT_SHADOW_SHIFT;
-    lost += share(255 - lost, loss); // of the light that is left
-    if (args->alone || args->close) {
-        *word = sum + lost;
-        return (sum + lost) != args->samples * lost;
-    }
-    *word = sum | lost << PT_SHADOW_SHIFT;
-    return 0;
+    return pt_shadow_share(lit->args.loss, opacities[keys[2 * (size_t)texel] - lit->args.caster]);
 }
 
 // Where PT_LANES points of the chunk are, from slot i on.
@@ -254,7 +234,9 @@ static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk
     const uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(lit, &fall, id) : 0;
     for (uint32_t left = args->close || args->compare ? vm_bits(lanes) : shadowed; left; left &= left - 1) {
         const uint32_t k = (uint32_t)__builtin_ctz(left);
-        differs |= note(args, words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(lit, queue->texel[at + k]) : 0);
+        // 4. what the sample takes goes into the word
+        differs |= pt_shadow_note(words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(lit, queue->texel[at + k]) : 0,
+                                  args->alone || args->close, args->samples);
     }
     return differs;
 }

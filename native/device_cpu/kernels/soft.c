@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // soft: the balls of soft points before each pixel, front to back [S]. SPEC 5, soft; twin of shaders/kernels/soft.comp
-#include "soft_balls.h"
-#include "soft_discs.h"
+#include "soft_veil.h"
 #include "shared/balls.h"
 
 struct soft {
@@ -61,8 +60,14 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
         struct pt_soft_tile tile = {.bins = bins, .x = (int32_t)x, .y = (int32_t)y, .thread = thread};
         tile.width = rect[2] - x < PT_SOFT_TILE ? rect[2] - x : PT_SOFT_TILE;
         tile.height = rect[3] - y < PT_SOFT_TILE ? rect[3] - y : PT_SOFT_TILE;
+        if (bins->args->veils) {
+            pt_soft_veils(&tile, list, count);
+            continue;
+        }
         load(&tile);
-        if (count && bins->args->model == PT_SOFT_EXPRESS)
+        if (count && bins->args->model >= PT_SOFT_SPLATS)
+            pt_soft_splats(&tile, list, count);
+        else if (count && bins->args->model == PT_SOFT_EXPRESS)
             pt_soft_discs(&tile, list, count);
         else if (count)
             pt_soft_balls(&tile, list, count, soft->memory + thread * pt_soft_hit_bytes(soft->room), soft->room);
@@ -82,7 +87,7 @@ static int draw_batch(struct soft *soft)
         soft->room = count > soft->room ? count : soft->room;
     }
     soft->room = (soft->room + 31) / 16 * 16;
-    if (bins->args->model != PT_SOFT_EXPRESS &&
+    if (!PT_SOFT_DISCS(bins->args->model) && !bins->args->veils &&
         !(soft->memory = pt_cpu_scratch(bins->call, 1, pt_pool_threads(bins->call->pool) * pt_soft_hit_bytes(soft->room))))
         return PATINA_ERROR_MEMORY;
     pt_parallel(bins->call->pool, bins->end - bins->first, 1, draw_tiles, soft);

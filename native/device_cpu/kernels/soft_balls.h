@@ -79,6 +79,37 @@ static inline vf pt_soft_depth(const struct soft_args *args, vf shells, vf d, vf
     return args->model == PT_SOFT_BASE ? pt_soft_integral(d, from, to) : pt_soft_shells(args->mu, shells, d, from, to, some);
 }
 
+// How many shells balls have; 1 or more.
+static inline vf pt_soft_shell_count(const struct soft_args *args, vf z, vf r, vm some)
+{
+    const vf one = vf_set(1.0f);
+    if (args->shells)
+        return vf_set((float)args->shells);
+    const vf pixels = r * vf_rcp(vf_select(some, vf_max(vf_footprint(&args->view, z), vf_set(1e-30f)), one));
+    const vf wanted = vf_min(pixels * vf_set(1.0f / PT_SOFT_RING), vf_set(PT_SOFT_SHELLS)), whole = vf_floor(wanted);
+    const vf shells = vf_max(vf_select(vf_lt(whole, wanted), whole + one, whole), one);
+    return vf_select(vf_lt(vf_zero(), z), shells, vf_set(PT_SOFT_SHELLS));
+}
+
+// m lambda of balls: what their depth is multiplied by. half: of the chord; a, w: of the record.
+static inline vf pt_soft_density(const struct soft_args *args, vf shells, vf d, vf half, vf a, vf w, vm some)
+{
+    const vf one = vf_set(1.0f), zero = vf_zero();
+    const vf full = vf_min(a, vf_set(PT_SOFT_FULLEST)), lambda = zero - pt_soft_log1p(zero - full);
+    vf factor = one;
+    if (vm_bits(vm_and(some, vf_lt(w, one)))) { // [S Eq. 22]
+        const vf whole = lambda * pt_soft_depth(args, shells, d, zero - half, half, some);
+        const vf own = one - vf_exp2(vf_max(whole * vf_set(-1.44269504f), vf_set(-126.0f)));
+        const vf opacity = (full * (one - d)) * (one - w) + own * w;
+        const vm sure = vm_and(vf_lt(w, one), vf_lt(vf_set(1e-9f), whole));
+        factor = vf_select(sure,
+                           (zero - pt_soft_log1p(zero - vf_min(opacity, vf_set(PT_SOFT_FULLEST)))) *
+                               vf_rcp(vf_select(sure, whole, one)),
+                           one);
+    }
+    return factor * lambda;
+}
+
 struct pt_soft_ray {
     float x, y, u, v, n, root; // x, y: pixel's centre
     float from, to;            // along it
@@ -110,13 +141,7 @@ static inline void pt_soft_meet(const struct pt_soft_tile *tile, const struct pt
         if (!lanes)
             continue;
         const vf d = square * vf_rsqrt(vf_max(square, vf_set(1e-30f)));
-        const vf pixels = p[3] * vf_rcp(vf_select(some, vf_max(vf_footprint(&args->view, p[2]), vf_set(1e-30f)), one));
-        vf shells = vf_set((float)args->shells);
-        if (!args->shells) {
-            const vf wanted = vf_min(pixels * vf_set(1.0f / PT_SOFT_RING), vf_set(PT_SOFT_SHELLS)), whole = vf_floor(wanted);
-            shells = vf_max(vf_select(vf_lt(whole, wanted), whole + one, whole), one);
-            shells = vf_select(vf_lt(zero, p[2]), shells, vf_set(PT_SOFT_SHELLS));
-        }
+        const vf shells = pt_soft_shell_count(args, p[2], p[3], some);
         const uint32_t at = hits->count;
         vi_pack((uint32_t *)(void *)(hits->d + at), vf_bits(d), lanes);
         vi_pack((uint32_t *)(void *)(hits->along + at), vf_bits(along), lanes);
@@ -146,19 +171,7 @@ static inline float pt_soft_weigh(const struct pt_soft_tile *tile, const struct 
         const vi word = vf_bits(vf_select(some, look[3], zero));
         const vf a = vi_convert(vi_shr(word, PT_SOFT_SHIFT)) * vf_set(1.0f / PT_SOFT_STEPS),
                  w = vi_convert(vi_and(word, vi_set(255))) * vf_set(1.0f / 255.0f);
-        const vf full = vf_min(a, vf_set(PT_SOFT_FULLEST)), lambda = zero - pt_soft_log1p(zero - full);
-        vf factor = one;
-        if (vm_bits(vm_and(some, vf_lt(w, one)))) { // [S Eq. 22]
-            const vf whole = lambda * pt_soft_depth(args, shells, d, zero - half, half, some);
-            const vf own = one - vf_exp2(vf_max(whole * vf_set(-1.44269504f), vf_set(-126.0f)));
-            const vf opacity = (full * (one - d)) * (one - w) + own * w;
-            const vm sure = vm_and(vf_lt(w, one), vf_lt(vf_set(1e-9f), whole));
-            factor = vf_select(sure,
-                               (zero - pt_soft_log1p(zero - vf_min(opacity, vf_set(PT_SOFT_FULLEST)))) *
-                                   vf_rcp(vf_select(sure, whole, one)),
-                               one);
-        }
-        vf_store(hits->depth + i, factor * lambda);
+        vf_store(hits->depth + i, pt_soft_density(args, shells, d, half, a, w, some));
         vf_store(hits->weight + i, (one - d) * a);
         for (int k = 0; k < 3; k++)
             vf_store(hits->color[k] + i, vf_select(some, look[k], zero));

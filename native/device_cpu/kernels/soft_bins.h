@@ -44,11 +44,14 @@ static inline uint32_t pt_soft_range(uint32_t count, uint32_t ranges, uint32_t i
     return (uint32_t)((uint64_t)count * i / ranges);
 }
 
+// Of a light's view all are balls.
+static inline int pt_soft_of_discs(const struct soft_args *args) { return PT_SOFT_DISCS(args->model) && !args->veils; }
+
 // Ends of PT_LANES balls or discs on screen along one axis, pixels of the picture. ray: of the centre, in units of the axis.
 static inline void pt_soft_ends(const struct pt_soft_bins *bins, vf ray, vf ratio, float begin, float step, vf out[2])
 {
     const vf one = vf_set(1.0f), slope = ray * ray + one, scale = vf_rcp(vf_set(step));
-    if (bins->args->model == PT_SOFT_EXPRESS) {
+    if (pt_soft_of_discs(bins->args)) {
         const vf half = ratio * (slope * vf_rsqrt(slope));
         out[0] = (ray - half - vf_set(begin)) * scale;
         out[1] = (ray + half - vf_set(begin)) * scale;
@@ -66,9 +69,11 @@ static inline vm pt_soft_boxes(const struct pt_soft_bins *bins, const vf p[4], v
     const struct view_args *view = &bins->args->view;
     const vf one = vf_set(1.0f), zero = vf_zero();
     const float begin[2] = {view->ray_x0, view->ray_y0}, step[2] = {view->ray_xs, view->ray_ys};
-    vm good = some; // of others the eye may stand in the ball: it is everywhere
     vf r = one;
-    if (view->perspective && bins->args->model != PT_SOFT_EXPRESS)
+    if (view->perspective && pt_soft_of_discs(bins->args)) // others lie behind the eye
+        some = vm_and(some, vf_lt(vf_set(PT_SOFT_BEFORE), p[2]));
+    vm good = some; // of others the eye may stand in the ball: it is everywhere
+    if (view->perspective && !pt_soft_of_discs(bins->args))
         good = vm_and(some, vf_lt(vf_set(1.001f) * p[3], p[2]));
     if (view->perspective)
         r = vf_rcp(vf_select(good, p[2], one));

@@ -404,13 +404,20 @@ PATINA_API int patina_ramp(const char *name, float colors[PATINA_MAX_RAMP][3]);
 enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, PATINA_FREE_SPACE_USE = 2 };
 
 // What points are. ALL: every one is a ball of density, drawn in the order of depth with those of all soft clouds, over what is opaque
-// and behind it, hidden by what is opaque before it. Keys, depth, picks, lines and other passes tell of the rest of the scene; soft
-// points neither cast nor take shadows yet. FIELD: so are
-// points whose field is above soft_threshold; the others are as with OFF.
+// and behind it, hidden by what is opaque before it. Keys, depth, picks, lines and other passes tell of the rest of the scene. Soft
+// points take shadows, and cast them as dark as what they let through up to each point. FIELD: so are points whose field is above
+// soft_threshold; the others are as with OFF.
 enum patina_soft { PATINA_SOFT_OFF = 0, PATINA_SOFT_ALL = 1, PATINA_SOFT_FIELD = 2 };
 // BASE: the density along the ray, exactly, through balls that intersect. CONCENTRIC: by shells of even density, which come to BASE as
-// they grow many. EXPRESS: a disc a ball, ten times faster.
-enum patina_soft_model { PATINA_SOFT_BASE = 0, PATINA_SOFT_CONCENTRIC = 1, PATINA_SOFT_EXPRESS = 2 };
+// they grow many. EXPRESS: a disc a ball, ten times faster. For comparison, as in the paper: SPLATS: the nearest discs alone, opaque;
+// ONE_LAYER: the same, with their opacities: nothing of what is soft behind them shows. Both cast and take shadows as EXPRESS.
+enum patina_soft_model {
+    PATINA_SOFT_BASE = 0,
+    PATINA_SOFT_CONCENTRIC = 1,
+    PATINA_SOFT_EXPRESS = 2,
+    PATINA_SOFT_SPLATS = 3,
+    PATINA_SOFT_ONE_LAYER = 4
+};
 
 // What a cloud leaves out of shadows [D 6].
 enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2, PATINA_SHADOW_NO_SELF = 4 };
