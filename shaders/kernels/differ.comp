@@ -3,6 +3,7 @@
 // native/device_cpu/kernels/differ.c
 #version 430 core
 #include "shared/ranges.h"
+#include "shared/words.h"
 #include "lib/math.glsl"
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { differ_args args; };
