@@ -36,7 +36,7 @@ struct soft {
     const struct pt_gl_work *work;
     const struct soft_args *args;
     uint32_t columns, tiles, model;
-    uint32_t draw; // which variant does
+    uint32_t draw;             // which variant does
     uint32_t *counts, *begins; // of every tile; of the batch's, and the end of the last
 };
 

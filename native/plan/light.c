@@ -74,12 +74,6 @@ int pt_mesh_receives(const struct pt_mesh_instance *instance)
 // Meshes are opaque, and among the opaque casters of everyone.
 static int meshes_cast(const struct pt_shadow_group *group) { return !group || group->only == PT_NO_INSTANCE; }
 
-int pt_receives(const struct pt_instance *instance)
-{
-    return !(instance->style.shadow_off & PATINA_SHADOW_NO_RECEIVE) && instance->style.lighting == PATINA_LIGHTING_LIT &&
-           instance->cloud->info.drawn;
-}
-
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     return scene->settings.shadow_lazy && plan->layers <= 1 && !(scene->settings.shadow_error > 0.0f) &&
@@ -161,7 +155,7 @@ int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_g
 // Bounds of the casters' chunks in a frame (rows x, y, z) from `eye`; perspective: of x / -z and y / -z too.
 struct extent {
     const double *axes, *eye;
-    double reach; // of balls beyond their centres
+    double reach;     // of balls beyond their centres
     int some, behind; // behind: part of it is beside or behind the eye
     double lower[3], upper[3];
     double tangent[4]; // left, bottom, right, top
@@ -379,8 +373,8 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
     for (uint32_t i = 0; i < scene->instance_count; i++)
         if (pt_group_casts(scene, group, i)) {
             instances[out->instance_count] = scene->instances[i];
-            instances[out->instance_count].style.cull_back = 0;      // both sides cast
-            instances[out->instance_count].style.surface = 0;        // maps are filled
+            instances[out->instance_count].style.cull_back = 0; // both sides cast
+            instances[out->instance_count].style.surface = 0;   // maps are filled
             if (!group->soft)
                 instances[out->instance_count].style.transparency = 0; // its map has one layer
             out->instance_count++;
@@ -638,8 +632,8 @@ static void put_instance(struct key *key, const struct patina_scene *scene, cons
     put(key, (double)instance->style.d_min);
     if (casts_soft(instance)) {
         const patina_cloud_style *style = &instance->style;
-        const double own[] = {(double)style->soft,         (double)style->soft_model,   (double)style->soft_shells,
-                              (double)style->soft_radius,  (double)style->soft_opacity, (double)style->soft_modulation,
+        const double own[] = {(double)style->soft,        (double)style->soft_model,   (double)style->soft_shells,
+                              (double)style->soft_radius, (double)style->soft_opacity, (double)style->soft_modulation,
                               (double)style->transparency};
         for (size_t k = 0; k < sizeof own / sizeof *own; k++)
             put(key, own[k]);

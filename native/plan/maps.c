@@ -83,7 +83,7 @@ static int pixels_as_cloud(const struct patina_scene *scene, const struct pt_pla
 }
 
 struct tests {
-    struct pt_builder builder;               // of the map
+    struct pt_builder builder; // of the map
     const struct pt_shadow_group *group;
     const struct patina_scene *scene, *view; // the picture's, and as the light sees it
     const struct pt_plan *picture;
@@ -275,10 +275,12 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
         error = pt_plan_depth(&builder);
     }
     if (!error && (group->soft ? map->soft_part_count > 0 : pt_plan_shows(map))) {
-        if (group->soft)
+        if (group->soft) {
+            pt_plan_no_veil(&builder);
             pt_plan_veil(&builder);
-        else
+        } else {
             pt_plan_clears(&builder, 0);
+        }
         tests.builder.room = builder.room; // goes on where that ended
         tests.builder.listed = builder.listed;
         tests.builder.step_room = builder.step_room;

@@ -273,9 +273,9 @@ struct pt_plan {
     uint32_t soft_count, soft_entries; // soft instances in view; those and what parts draw
     struct pt_soft_part *soft_parts;   // those farther away first, rows beside each other
     uint32_t soft_part_count;
-    uint32_t soft_records;             // room for the largest part
-    float soft_depths[2];              // z that balls of the whole picture begin and end at
-    uint32_t veils;                    // of a light's map: slabs of depth that its soft points are counted in; 0: it is one of surfaces
+    uint32_t soft_records; // room for the largest part
+    float soft_depths[2];  // z that balls of the whole picture begin and end at
+    uint32_t veils;        // of a light's map: slabs of depth that its soft points are counted in; 0: it is one of surfaces
     uint32_t discs_first, discs_count; // ids whose points are discs
     int sigmas;  // some points know how thick their surface is: d_eff follows it, and the span plane holds
     int reaches; // points know how far they spread: holes are closed no farther
@@ -449,11 +449,15 @@ int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, ui
 int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i); // the same, told in its reason
 // Once they are known: of a sample of light i.
 static inline uint32_t pt_light_faces(const struct pt_plan *plan, uint32_t i) { return plan->lights[i].cube ? 6 : 1; }
-int pt_receives(const struct pt_instance *instance); // shadows, at all
+static inline int pt_receives(const struct pt_instance *instance) // shadows, at all
+{
+    return !(instance->style.shadow_off & PATINA_SHADOW_NO_RECEIVE) && instance->style.lighting == PATINA_LIGHTING_LIT &&
+           instance->cloud->info.drawn;
+}
 int pt_mesh_casts(const struct pt_mesh_instance *instance);
 int pt_mesh_receives(const struct pt_mesh_instance *instance);
-int pt_soft_casts(const struct patina_scene *scene);    // some soft point does
-int pt_soft_receives(const struct patina_scene *scene); // shadows: some soft point
+int pt_soft_casts(const struct patina_scene *scene);      // some soft point does
+int pt_soft_receives(const struct patina_scene *scene);   // shadows: some soft point
 int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: its points have opacities of their own
 // Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late. Not
 // with an error target: a part of the picture would stop at other samples than the whole. Not where soft points take shadows: no

@@ -321,12 +321,11 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
         args.weight = style->soft == PATINA_SOFT_FIELD ? fminf(1.0f / (style->soft_modulation * PT_FIELD_MOST), 1.0f)
                                                        : fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
     const enum pt_instance_buffer colors = args.shade.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
-    struct pt_pass *pass =
-        PT_ADD(builder, gather, args,
-               {pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
-                pt_buffer_of(PT_SURFACE, i), pt_field_of(instance, i), pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i),
-                late ? pt_buffer_of(PT_SHADOWS, instance->of) : pt_nothing(),
-                args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()});
+    struct pt_pass *pass = PT_ADD(
+        builder, gather, args,
+        {pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
+         pt_buffer_of(PT_SURFACE, i), pt_field_of(instance, i), pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i),
+         late ? pt_buffer_of(PT_SHADOWS, instance->of) : pt_nothing(), args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()});
     pass->late = late;
     PT_REASON(pass, "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,
               args.shade.instance.lit ? "lit" : "unlit");
@@ -466,7 +465,6 @@ static void plan_veil(struct pt_builder *builder, const struct pt_soft_part *par
 void pt_plan_veil(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    pt_plan_no_veil(builder);
     pt_plan_sift(builder);
     for (uint32_t k = 0; k < plan->soft_part_count; k++) {
         plan_gathers(builder, &plan->soft_parts[k]);

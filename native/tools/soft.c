@@ -93,9 +93,8 @@ static int parse_numbers_of(const char *text, struct tool_soft *soft)
     static const struct {
         const char *word;
         uint32_t source;
-    } known[] = {{"uncertainty", PATINA_FIELD_UNCERTAINTY},
-                 {"density", PATINA_FIELD_DENSITY},
-                 {"luminance", PATINA_FIELD_LUMINANCE}};
+    } known[] = {
+        {"uncertainty", PATINA_FIELD_UNCERTAINTY}, {"density", PATINA_FIELD_DENSITY}, {"luminance", PATINA_FIELD_LUMINANCE}};
     const size_t length = strcspn(text, ",");
     if (!length || length >= sizeof soft->attribute)
         return -1;

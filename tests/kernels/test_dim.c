@@ -112,8 +112,8 @@ static void check(struct harness *h, const struct setup *s, uint32_t base)
                                 (now & PT_SHADOW_SUM) != args.samples * (now - (word & PT_SHADOW_SUM));
             if (!(inside != REF_NO && admissible(&args, word, now, loss)) &&
                 !(inside != REF_YES && admissible(&args, word, now, none)))
-                harness_fail(h, "word", (int)id, (int)c, "got %08x from %08x, expected a loss of %.3f to %.3f of 255", now, word,
-                             loss[0], loss[1]);
+                harness_fail(h, "word", (int)id, (int)c, "got %08x from %08x, expected a loss of %.3f to %.3f of 255", now,
+                             word, loss[0], loss[1]);
         }
     HARNESS_CHECK(h, tested > POINTS || args.marked);
     if (args.compare)

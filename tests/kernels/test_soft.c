@@ -495,8 +495,8 @@ static void veils_at_ends(struct harness *h)
         s = look_at(h, &rng, 2, 1, 1, model, 3000);
         for (uint32_t i = 0; i < 3000; i++) {
             const double z = rng_range(&rng, 2.0, 8.0);
-            put(&s, i, s.args.view.origin_x + 1.0, s.args.view.origin_y + 0.5, z, 0.7 * ref_footprint(&s.args.view, z), 4e-4, 1.0,
-                white);
+            put(&s, i, s.args.view.origin_x + 1.0, s.args.view.origin_y + 0.5, z, 0.7 * ref_footprint(&s.args.view, z), 4e-4,
+                1.0, white);
         }
         s.args.shells = 3;
         check_veils(h, &s, 9);

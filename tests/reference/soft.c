@@ -246,7 +246,8 @@ double ref_soft_veil(const struct soft_args *args, const uint32_t *records, int 
             const double low = fmin(fmax((root * from - ball.along + ball.r) / (2.0 * ball.r), 0.0), 1.0),
                          high = fmin(fmax((root * to - ball.along + ball.r) / (2.0 * ball.r), 0.0), 1.0);
             if (ball.d < 1.0)
-                sum -= log1p(-fmin(ref_soft_disc(ball.d * ball.d, ball.a, ball.w), (double)PT_SOFT_FULLEST)) * fmax(high - low, 0.0);
+                sum -= log1p(-fmin(ref_soft_disc(ball.d * ball.d, ball.a, ball.w), (double)PT_SOFT_FULLEST)) *
+                       fmax(high - low, 0.0);
         } else if (ball.d < 1.0 && from < to) {
             sum -= log(ref_soft_ray(&ball, 1, &model, root * from, root * to).through);
         }

@@ -50,7 +50,8 @@ struct stage {
 
 static struct stage set(uint32_t model, const patina_light_desc *light)
 {
-    struct stage stage = {points_torus(TORUS, 1.0, 0.4, POINTS_ALL, 6), points_create(PROBES, POINTS_NORMALS), NULL, NULL, NULL};
+    struct stage stage = {points_torus(TORUS, 1.0, 0.4, POINTS_ALL, 6), points_create(PROBES, POINTS_NORMALS), NULL, NULL,
+                          NULL};
     struct pcg random = pcg_seed(3);
     for (uint64_t i = 0; i < PROBES; i++) {
         for (int k = 0; k < 2; k++)
@@ -120,7 +121,8 @@ static double arrives(const struct points *torus, const patina_light_desc *light
             continue;
         }
         const struct ref_soft_model as = {model == PATINA_SOFT_BASE ? PT_SOFT_BASE : PT_SOFT_CONCENTRIC, PT_SOFT_EVEN};
-        const struct ref_ball ball = {.d = d, .along = along, .r = (double)radius, .a = (double)opacity, .w = 1.0, .shells = 12};
+        const struct ref_ball ball = {
+            .d = d, .along = along, .r = (double)radius, .a = (double)opacity, .w = 1.0, .shells = 12};
         sum -= log(ref_soft_ray(&ball, 1, &as, 0.0, length).through);
     }
     return exp(-sum);
@@ -172,7 +174,7 @@ static void hold(patina_device *device, const char *name)
                        lights[which], model, instance == 1 ? "soft points" : "solid points", errors.worst, errors.mean,
                        100.0 * errors.dark);
                 assert_true(errors.dark > 0.2);
-                assert_true(errors.mean <= 0.04 && errors.worst <= 0.6);
+                assert_true(errors.mean <= 0.01 && errors.worst <= 0.2);
                 free(got);
             }
             strike(&stage);
@@ -271,7 +273,10 @@ static void test_switches(void **state)
             dark[0] += probes[i] < 0.95f;
         for (uint64_t i = 0; i < TORUS; i++)
             dark[1] += own[i] < 0.95f;
-        printf("  %s: %llu probes and %llu soft points in shadow\n", k == 0 ? "no cast" : k == 1 ? "no self" : "as ever",
+        printf("  %s: %llu probes and %llu soft points in shadow\n",
+               k == 0   ? "no cast"
+               : k == 1 ? "no self"
+                        : "as ever",
                (unsigned long long)dark[0], (unsigned long long)dark[1]);
         assert_true(k == 0 ? !dark[0] && !strstr(text, "run  dim") : dark[0] > PROBES / 5 && strstr(text, "run  dim"));
         assert_true(k < 2 ? !dark[1] : dark[1] > TORUS / 2);
@@ -283,15 +288,19 @@ static void test_switches(void **state)
     patina_device_destroy(device);
 }
 
-// A wall between the sun and soft points: their picture gets dark; and a mesh below soft points does, as much as these let through.
+// A roof of points between the sun and soft points: their picture gets dark; and a mesh below soft points does, as much as these let through.
 static void pictures(patina_device *device, const char *name)
 {
-    const double eye[3] = {0.5, -4.0, 2.0}, target[3] = {0}, high[3] = {0, 0, 3.0}, low[3] = {0, 0, -1.2}, wide[3] = {4, 4, 0.05};
+    const double eye[3] = {0.5, -4.0, 2.0}, target[3] = {0}, low[3] = {0, 0, -1.2}, wide[3] = {4, 4, 0.05};
     const patina_camera camera = camera_perspective(eye, target, 45.0, WIDTH, HEIGHT, 0.1, 100.0);
     patina_settings settings = settings_default(WIDTH, HEIGHT);
     patina_light_desc light = light_of(0);
     light.direction[0] = light.direction[1] = 0.0;
-    patina_mesh *roof = mesh_box(high, wide), *floor = mesh_box(low, wide);
+    struct points above = points_rectangle(40000, 8.0, 8.0, POINTS_NORMALS, 8);
+    for (uint64_t i = 0; i < above.count; i++)
+        above.position[3 * i + 2] = 6.0f; // beyond the picture
+    patina_cloud *roof = points_upload(&above);
+    patina_mesh *floor = mesh_box(low, wide);
     double sums[4] = {0};
     for (int k = 0; k < 4; k++) { // as it is, with a roof; a floor without and with soft points over it
         struct stage stage = set(PATINA_SOFT_EXPRESS, &light);
@@ -299,8 +308,10 @@ static void pictures(patina_device *device, const char *name)
         patina_scene_clear(stage.scene);
         if (k != 2)
             CHECK(patina_scene_add_cloud(stage.scene, stage.soft, &style), stage.scene);
-        if (k)
-            mesh_add(stage.scene, k == 1 ? roof : floor, 0.8f, 0.8f, 0.8f);
+        if (k == 1)
+            CHECK(patina_scene_add_cloud(stage.scene, roof, NULL), stage.scene);
+        else if (k)
+            mesh_add(stage.scene, floor, 0.8f, 0.8f, 0.8f);
         CHECK(patina_scene_add_light(stage.scene, &light), stage.scene);
         settings.passes = 1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_SHADOW;
         patina_frame *frame = NULL;
@@ -316,11 +327,12 @@ static void pictures(patina_device *device, const char *name)
         patina_frame_destroy(frame);
         strike(&stage);
     }
-    printf("  %s: red %.1f in the sun, %.1f below a roof; %.3f of the light on a floor, %.3f below soft points\n", name, sums[0],
-           sums[1], sums[2], sums[3]);
+    printf("  %s: red %.1f in the sun, %.1f below a roof; %.3f of the light on a floor, %.3f below soft points\n", name,
+           sums[0], sums[1], sums[2], sums[3]);
     assert_true(sums[1] < 0.7 * sums[0]);
     assert_true(sums[2] > 0.999 && sums[3] < 0.97 && sums[3] > 0.5);
-    patina_mesh_destroy(roof);
+    patina_cloud_destroy(roof);
+    points_free(&above);
     patina_mesh_destroy(floor);
 }
 

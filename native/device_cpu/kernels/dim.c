@@ -47,7 +47,8 @@ static inline vi loss_of(const struct dim *dim, const struct chunk_view *chunk, 
     inside = vm_and(lanes, vm_and(inside, vf_le(vf_set(view->z_near), z)));
     if (!vm_bits(inside))
         return vi_set(0);
-    const vf deep = vf_select(inside, clamped((z - vf_set(args->veil_from)) * vf_set(args->veil_scale), args->veils), vf_zero());
+    const vf deep = vf_select(inside, clamped((z - vf_set(args->veil_from)) * vf_set(args->veil_scale), args->veils),
+                              vf_zero());
     const vf slab = vf_min(vf_floor(deep), vf_set((float)(args->veils - 1)));
     const vi in = vf_int(slab);
     const vf x = vf_select(inside, (at[0] - half) - vf_set((float)view->origin_x), vf_zero()),

@@ -102,10 +102,9 @@ static inline vf pt_soft_density(const struct soft_args *args, vf shells, vf d, 
         const vf own = one - vf_exp2(vf_max(whole * vf_set(-1.44269504f), vf_set(-126.0f)));
         const vf opacity = (full * (one - d)) * (one - w) + own * w;
         const vm sure = vm_and(vf_lt(w, one), vf_lt(vf_set(1e-9f), whole));
-        factor = vf_select(sure,
-                           (zero - pt_soft_log1p(zero - vf_min(opacity, vf_set(PT_SOFT_FULLEST)))) *
-                               vf_rcp(vf_select(sure, whole, one)),
-                           one);
+        factor = vf_select(
+            sure, (zero - pt_soft_log1p(zero - vf_min(opacity, vf_set(PT_SOFT_FULLEST)))) * vf_rcp(vf_select(sure, whole, one)),
+            one);
     }
     return factor * lambda;
 }

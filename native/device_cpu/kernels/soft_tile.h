@@ -15,7 +15,8 @@ struct pt_soft_tile {
     uint64_t fragments;
     float through[PT_SOFT_PIXELS], color[3][PT_SOFT_PIXELS], density[PT_SOFT_PIXELS];
     float from[PT_SOFT_PIXELS], to[PT_SOFT_PIXELS]; // z; beyond the rectangle there is nothing between
-    float front[PT_SOFT_PIXELS], weight[PT_SOFT_PIXELS], opacity[PT_SOFT_PIXELS]; // Splats, One Layer: how far a surface goes, sums
+    float front[PT_SOFT_PIXELS], weight[PT_SOFT_PIXELS],
+        opacity[PT_SOFT_PIXELS]; // Splats, One Layer: how far a surface goes, sums
 };
 
 // No pixel takes any more.

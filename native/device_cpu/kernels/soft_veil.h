@@ -50,8 +50,8 @@ static inline void pt_soft_veil_ball(const struct pt_soft_tile *tile, const floa
 {
     const struct soft_args *args = tile->bins->args;
     const struct view_args *view = &args->view;
-    const vf one = vf_set(1.0f), zero = vf_zero(), half = vf_set(0.5f), p[4] = {vf_set(record[0]), vf_set(record[1]),
-                                                                               vf_set(record[2]), vf_set(record[3])};
+    const vf one = vf_set(1.0f), zero = vf_zero(), half = vf_set(0.5f),
+             p[4] = {vf_set(record[0]), vf_set(record[1]), vf_set(record[2]), vf_set(record[3])};
     const vf px = vi_convert(vi_add(vi_set((uint32_t)x), vi_lanes())) + vf_set((float)(view->origin_x + tile->x)) + half,
              py = vf_set((float)(view->origin_y + tile->y + y) + 0.5f);
     vf u = zero, v = zero, scale = one, n = one, root = one;
@@ -91,7 +91,7 @@ static inline void pt_soft_veil_ball(const struct pt_soft_tile *tile, const floa
         if (vm_bits(within))
             pt_soft_lose(veil, k, (uint32_t)y * PT_SOFT_TILE + (uint32_t)x,
                          depth * pt_soft_lost(args, shells, vf_select(within, d, zero), vf_select(within, low, zero),
-                                               vf_select(within, high, zero), within),
+                                              vf_select(within, high, zero), within),
                          within);
     }
 }
