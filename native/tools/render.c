@@ -16,7 +16,7 @@ struct job {
     patina_device *device;
     patina_device_info device_info;
     patina_progress *progress;
-    patina_cloud **clouds;    // options.file_count, as fields, of those that have one
+    patina_cloud **clouds; // options.file_count, as fields, of those that have one
     patina_field **fields;
     struct tool_scans *scans; // beside them
     patina_mesh *meshes[TOOL_MESHES];

@@ -4,6 +4,7 @@
 // A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). A word belongs to one point, so invocations never meet.
 #version 430 core
 #include "shared/shadows.h"
+#include "shared/words.h"
 #include "lib/math.glsl"
 #include "lib/shadow_words.glsl"
 
