@@ -66,7 +66,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "scans", "independent", "session", "analysis", "walk", "ranges", "soft", "graphics", "scaling")
+          "leaves", "scans", "independent", "session", "analysis", "walk", "ranges", "soft", "platforms", "graphics", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
