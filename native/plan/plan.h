@@ -203,7 +203,6 @@ struct pt_plan_instance {
     const struct pt_range *range; // range images: their image buffer (ranges.h); NULL: they are none
     struct instance_args args;
     float radius, radius_scale, radius_most, surface_scale; // of discs, as disc_args has them
-    uint32_t surface_certainty;                             // likewise
     struct chunk_view *chunks;                              // those in view
     struct pt_bounds *bounds;                               // of each of them
     uint32_t chunk_count;

@@ -82,7 +82,6 @@ static int list_discs(struct pt_builder *builder, const struct blend_args *blend
                                                      .radius_scale = instance->radius_scale,
                                                      .radius_most = instance->radius_most,
                                                      .surface_scale = instance->surface_scale,
-                                                     .surface_certainty = instance->surface_certainty,
                                                      .shadowed = (uint32_t)pt_receives(instance->instance)};
         out->chunks += instance->chunk_count;
         out->points += instance->points;

@@ -31,10 +31,6 @@
 // between. Of a sphere of random points 1.2 % stays open at 1, 0.03 at 1.4, 0.01 at 1.55; at 1.6 sharp edges and slits lose half a
 // decibel. Borders, lines and foliage end where they end.
 #define SURFACE_SCALE 1.55f
-// Likewise of discs beside filled points, which are closed across a pixel or two: of points that surely lie on a surface alone. The far
-// side of a ball of 60,000 random points shows in 8,847 pixels at 1 and in 116 at 1.4, and no surface is drawn where there is none.
-#define CERTAIN_SCALE 1.4f
-#define CERTAIN 14u // of 15
 
 // One chunk in view, before it is known which window the planes get.
 struct seen {
@@ -53,9 +49,10 @@ static double radius_most(const struct pt_instance *instance, double thinned)
     return fmin(0.5 * (double)instance->style.largest_gap * thinned, (double)PT_DISC_MOST);
 }
 
-static int only_discs(const struct patina_scene *scene) { return scene->settings.surface == PATINA_SURFACE_SPLATS; }
-
-static float surface_scale(const struct patina_scene *scene) { return only_discs(scene) ? SURFACE_SCALE : CERTAIN_SCALE; }
+static float surface_scale(const struct patina_scene *scene)
+{
+    return scene->settings.surface == PATINA_SURFACE_SPLATS ? SURFACE_SCALE : 1.0f;
+}
 
 static double own_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object,
                         const struct pt_chunk *chunk, double thinned, int most)
@@ -64,10 +61,8 @@ static double own_reach(const struct patina_scene *scene, const struct pt_instan
         return (double)instance->style.radius * thinned;
     if (instance->cloud->info.has_radii)
         return (double)instance->cloud->info.radius_most * object->scale * thinned;
-    if (instance->cloud->shapes && most)
-        return (double)(surface_scale(scene) * chunk->reach) * object->scale * thinned;
     if (instance->cloud->shapes)
-        return (double)((only_discs(scene) ? SURFACE_SCALE : 1.0f) * chunk->footprint) * object->scale * thinned;
+        return (double)(surface_scale(scene) * (most ? chunk->reach : chunk->footprint)) * object->scale * thinned;
     return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale *
            thinned; // classes of spacings are 1.19 wide
 }
@@ -351,7 +346,6 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     out->radius = (float)fmin((double)instance->style.radius * pt_thinning(scene), (double)PT_DISC_MOST);
     out->radius_most = (float)radius_most(instance, pt_thinning(scene));
     out->surface_scale = surface_scale(scene);
-    out->surface_certainty = only_discs(scene) ? 0 : CERTAIN;
     out->radius_scale = (float)fmin(survey->objects[i].scale * pt_thinning(scene), (double)PT_DISC_MOST);
     pt_set_instance(&survey->camera, &survey->objects[i], instance, pt_thinning(scene), &out->args);
     out->args.id_base += id_base;

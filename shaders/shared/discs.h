@@ -28,8 +28,7 @@ struct disc_args {
     float radius;       // world units, of every point; 0: its own, or its shape's, else PT_DISC_SPACINGS times its spacing
     float radius_scale; // object units -> world, times what strata leave out
     float radius_most;  // world units: no half axis is longer; 0: as long as it is
-    float surface_scale; // of half axes of shapes whose kind is PT_KIND_SURFACE, before that, ...
-    uint32_t surface_certainty; // ... where the point's certainty, of 15, is at least this
+    float surface_scale; // of half axes of shapes whose kind is PT_KIND_SURFACE, before that
     uint32_t shadowed;   // blend: 1: the instance receives shadows
 };
 

@@ -96,7 +96,6 @@ static void ellipses(struct harness *h)
                 discs_shape(h, &rng, &scene, i, &camera, i == 2 ? stretch : NULL);
                 scene.discs[i].radius_most = i == 1 ? 0.15f : 0.0f;
                 scene.discs[i].surface_scale = i == 2 ? 1.0f : 1.45f;
-                scene.discs[i].surface_certainty = i == 0 ? 9 : 0;
             }
             check_scene(h, &scene);
         }

@@ -28,9 +28,7 @@ static double radius_of(const struct disc_args *args, const void *radii, uint32_
         return args->radius;
     if (is_shaped(args)) {
         const uint32_t shape = ((const uint32_t *)radii)[id];
-        const int scaled = (shape >> PT_SHAPE_KIND_SHIFT & 7u) == PT_KIND_SURFACE &&
-                           (shape >> PT_SHAPE_CERTAINTY_SHIFT & 15u) >= args->surface_certainty;
-        const double scale = scaled ? (double)args->surface_scale : 1.0;
+        const double scale = (shape >> PT_SHAPE_KIND_SHIFT & 7u) == PT_KIND_SURFACE ? (double)args->surface_scale : 1.0;
         return scale * (double)args->instance.spacing[shape & PT_SHAPE_CLASS_BITS];
     }
     if (args->has_radii)

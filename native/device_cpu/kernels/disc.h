@@ -61,11 +61,8 @@ static inline void pt_disc_size(const struct disc_args *args, const void *radii,
     if (pt_disc_shaped(args)) {
         d->shape = vi_gather(radii, id, lanes);
         const vi kind = vi_and(vi_shr(d->shape, PT_SHAPE_KIND_SHIFT), vi_set(7));
-        const vi certainty = vi_and(vi_shr(d->shape, PT_SHAPE_CERTAINTY_SHIFT), vi_set(15));
-        const vm scaled = vm_and(vi_eq(kind, vi_set(PT_KIND_SURFACE)),
-                                 vm_not(vi_lt_unsigned(certainty, vi_set(args->surface_certainty))));
         radius = vf_look_up(spacing, PT_SPACINGS, vi_and(d->shape, vi_set(PT_SHAPE_CLASS_BITS)));
-        radius = vf_select(scaled, radius * vf_set(args->surface_scale), radius);
+        radius = vf_select(vi_eq(kind, vi_set(PT_KIND_SURFACE)), radius * vf_set(args->surface_scale), radius);
         d->ratio = vf_look_up(pt_shape_ratios, 32, vi_and(vi_shr(d->shape, PT_SHAPE_RATIO_SHIFT), vi_set(15)));
     } else if (!(args->radius > 0.0f) && args->has_radii) {
         radius = vf_min(vf_gather(radii, id, lanes) * vf_set(args->radius_scale), vf_set(PT_DISC_MOST));
