@@ -86,7 +86,7 @@ def test_newcomers_path():
 # Where Blender 3.4 puts things in a window of 1280 x 800 as it comes, from the top left; dialogs have windows of their own.
 MENU_FILE, MENU_IMPORT, MENU_POINTS = (46, 13), (80, 295), (350, 546)
 DIALOG_FILE, DIALOG_IMPORT = (312, 78), (1031, 603)
-RENDERED, RENDER_TAB, STYLE, MUSEUM = (1017, 40), (1074, 354), (1168, 468), (661, 170)
+RENDERED, RENDER_TAB, STYLE, MUSEUM = (1017, 40), (1074, 354), (1168, 468), (787, 170)
 MOST_CLICKS = 16
 
 
