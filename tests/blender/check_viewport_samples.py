@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Samples in a window: a viewport at rest betters its picture, moving begins again; F12 shows each step."""
 
+import threading
 import time
 
 import bpy
@@ -140,6 +141,9 @@ def test_final_shows_each_step():
         item = next(item for item in result.layers[0].passes if item.name == "Combined")
         return _rect(item, result.resolution_y, result.resolution_x)
 
+    # Blender keeps one flag for all threads of whether Python may write, and a call sets it back to what it was when it
+    # began. A final render that begins while a panel is drawn leaves it at "may not" for good: nothing is drawn till ours began.
+    begun = threading.Event()
     put, stopped, write = passes.Shown.put, engine.PatinaRenderEngine._stopped, passes.write
     every = drawing.SHOWN_EVERY
     # without a window of its own: Blender 3.4 crashes when the scene that one shows is removed
@@ -156,9 +160,10 @@ def test_final_shows_each_step():
         ended.append((arguments[3]["COMBINED"], blenders(arguments[0])))
 
     passes.Shown.put, passes.write = watch, finish
-    engine.PatinaRenderEngine._stopped = lambda self: len(held) >= 5
+    engine.PatinaRenderEngine._stopped = lambda self: begun.set() or len(held) >= 5
     try:
         check(bpy.ops.render.render('INVOKE_DEFAULT') == {'RUNNING_MODAL'}, "Blender does not render")
+        check(begun.wait(30.0), "the render does not begin")
         yield lambda: ended and not bpy.app.is_job_running('RENDER') if hasattr(bpy.app, "is_job_running") else ended
     finally:
         passes.Shown.put, engine.PatinaRenderEngine._stopped, passes.write = put, stopped, write
