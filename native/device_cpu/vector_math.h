@@ -75,13 +75,6 @@ static inline void vf_decode_normal(vi word, vf n[3])
     n[2] = z;
 }
 
-// Row 0, 1 or 2 of points as the view sees their chunk: see struct chunk_view.
-static inline vf vf_transform(const struct chunk_view *chunk, int row, vf x, vf y, vf z)
-{
-    const float *r = chunk->row + 3 * row;
-    return (((vf_set(chunk->lo[row]) + vf_set(r[0]) * x) + vf_set(r[1]) * y) + vf_set(r[2]) * z) + vf_set(chunk->hi[row]);
-}
-
 // Normals of surface words in view space, not yet unit. Words without one give anything.
 static inline void vf_view_normal(const struct instance_args *instance, vi word, vf n[3])
 {
@@ -225,17 +218,6 @@ static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], con
         z = vf_select(good, z_q + rise * r, z);
     }
     return vf_min(vf_max(z, z_q), z_q + limit);
-}
-
-// Which of PT_LANES points face away.
-static inline vm pt_faces_away(const struct chunk_view *chunk, vi word, const vf p[3])
-{
-    vf n[3], v[3];
-    vf_decode_normal(word, n);
-    for (uint32_t k = 0; k < 3; k++)
-        v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * p[k];
-    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
-    return vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))));
 }
 
 #endif

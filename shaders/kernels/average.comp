@@ -6,8 +6,8 @@
 #version 430 core
 #include "shared/means.h"
 #include "shared/words.h"
-#include "lib/math.glsl"
 #include "lib/planes.glsl"
+#include "lib/points.glsl"
 #include "lib/srgb.glsl"
 
 #if STEP == 0
@@ -51,14 +51,6 @@ vec3 albedo_of(uint id)
 bool is_ours(uvec2 key) { return key.y != PT_KEY_EMPTY_Z && key.x - args.instance.id_base < args.instance.id_count; }
 
 #if STEP == 0
-
-bool faces_away(uint word, vec4 eye, vec3 p)
-{
-    if ((word & PT_NORMAL_BITS) == PT_NORMAL_NONE)
-        return false;
-    precise vec3 v = eye.xyz - eye.w * p;
-    return pt_dot(pt_decode_normal(word), v) <= 0.0;
-}
 
 // The point's unit normal, towards the viewer; 0 where it has none.
 vec3 turned_normal(view_args view, uint word, float x, float y)
@@ -104,10 +96,6 @@ void main()
 {
     chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
     view_args view = args.view;
-    vec3 row_x = vec3(chunk.row[0], chunk.row[1], chunk.row[2]);
-    vec3 row_y = vec3(chunk.row[3], chunk.row[4], chunk.row[5]);
-    vec3 row_z = vec3(chunk.row[6], chunk.row[7], chunk.row[8]);
-    vec4 eye = vec4(chunk.eye[0], chunk.eye[1], chunk.eye[2], chunk.eye[3]);
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y), top = float(view.origin_y + int(view.height));
     uint base = 3u * (chunk.first - first_slot);
@@ -117,21 +105,15 @@ void main()
         // 1. where the point lies, and how far its tent reaches
         uint at = base + i;
         vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
-        precise float z = (((chunk.lo[2] + row_z.x * p.x) + row_z.y * p.y) + row_z.z * p.z) + chunk.hi[2];
-        precise float x = (((chunk.lo[0] + row_x.x * p.x) + row_x.y * p.y) + row_x.z * p.z) + chunk.hi[0];
-        precise float y = (((chunk.lo[1] + row_y.x * p.x) + row_y.y * p.y) + row_y.z * p.z) + chunk.hi[1];
-        if (view.perspective != 0u) {
-            float r = pt_rcp(z);
-            x = x * r;
-            y = y * r;
-        }
+        vec3 seen = pt_project(view, chunk, p);
+        float x = seen.x, y = seen.y, z = seen.z;
         if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
             continue;
         if (args.sifted != 0u && chunk.sifted != 0u &&
             (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
             continue;
         uint id = chunk.first + i, word = surface[id];
-        if (chunk.cull != 0u && faces_away(word, eye, p))
+        if (chunk.cull != 0u && pt_faces_away(chunk, word, p))
             continue;
         float footprint = pt_footprint(view, z);
         precise float h = (PT_AVERAGE_TENT * args.instance.spacing[word >> PT_SPACING_SHIFT]) * pt_rcp(footprint);

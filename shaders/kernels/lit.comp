@@ -5,8 +5,8 @@
 #version 430 core
 #include "shared/shadows.h"
 #include "shared/words.h"
-#include "lib/math.glsl"
 #include "lib/planes.glsl"
+#include "lib/points.glsl"
 #include "lib/shadow_words.glsl"
 
 layout(local_size_x = 64) in;
@@ -85,14 +85,8 @@ bool in_shadow(view_args view, chunk_view chunk, uint at, uint id, out uint pixe
     pixel = 0u;
     // 1. project
     vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
-    precise float z = (((chunk.lo[2] + chunk.row[6] * p.x) + chunk.row[7] * p.y) + chunk.row[8] * p.z) + chunk.hi[2];
-    precise float x = (((chunk.lo[0] + chunk.row[0] * p.x) + chunk.row[1] * p.y) + chunk.row[2] * p.z) + chunk.hi[0];
-    precise float y = (((chunk.lo[1] + chunk.row[3] * p.x) + chunk.row[4] * p.y) + chunk.row[5] * p.z) + chunk.hi[1];
-    if (view.perspective != 0u) {
-        float r = pt_rcp(z);
-        x = x * r;
-        y = y * r;
-    }
+    vec3 seen = pt_project(view, chunk, p);
+    float x = seen.x, y = seen.y, z = seen.z;
     if (!(args.window[0] <= x && x < args.window[2] && args.window[1] <= y && y < args.window[3] && view.z_near <= z))
         return false;
     int column = int(floor(x)) - view.origin_x, row = int(floor(y)) - view.origin_y;

@@ -13,8 +13,8 @@
 #extension GL_NV_shader_atomic_int64 : require
 #endif
 #include "shared/points.h"
-#include "lib/math.glsl"
 #include "lib/planes.glsl"
+#include "lib/points.glsl"
 
 #ifdef PT_SOFTWARE
 layout(local_size_x = 8) in;
@@ -35,22 +35,10 @@ layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[];
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions and surface begins
 
-bool faces_away(uint word, vec4 eye, vec3 p)
-{
-    if ((word & PT_NORMAL_BITS) == PT_NORMAL_NONE)
-        return false;
-    precise vec3 v = eye.xyz - eye.w * p;
-    return pt_dot(pt_decode_normal(word), v) <= 0.0;
-}
-
 void main()
 {
     chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
     view_args view = args.view;
-    vec3 row_x = vec3(chunk.row[0], chunk.row[1], chunk.row[2]);
-    vec3 row_y = vec3(chunk.row[3], chunk.row[4], chunk.row[5]);
-    vec3 row_z = vec3(chunk.row[6], chunk.row[7], chunk.row[8]);
-    vec4 eye = vec4(chunk.eye[0], chunk.eye[1], chunk.eye[2], chunk.eye[3]);
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y), top = float(view.origin_y + int(view.height));
     bool cull = chunk.cull != 0u;
@@ -61,14 +49,8 @@ void main()
         // 1. project
         uint at = 3u * base + i;
         vec3 p = vec3(read_float(at), read_float(at + chunk.padded), read_float(at + 2u * chunk.padded));
-        precise float z = (((chunk.lo[2] + row_z.x * p.x) + row_z.y * p.y) + row_z.z * p.z) + chunk.hi[2];
-        precise float x = (((chunk.lo[0] + row_x.x * p.x) + row_x.y * p.y) + row_x.z * p.z) + chunk.hi[0];
-        precise float y = (((chunk.lo[1] + row_y.x * p.x) + row_y.y * p.y) + row_y.z * p.z) + chunk.hi[1];
-        if (view.perspective != 0u) {
-            float r = pt_rcp(z);
-            x = x * r;
-            y = y * r;
-        }
+        vec3 seen = pt_project(view, chunk, p);
+        float x = seen.x, y = seen.y, z = seen.z;
         // 2. clip: NaN fails every comparison; what was sifted out is not drawn
         if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
             continue;
@@ -78,7 +60,7 @@ void main()
             continue;
 #endif
         // 3. back faces
-        if (cull && faces_away(read_word(base + i), eye, p))
+        if (cull && pt_faces_away(chunk, read_word(base + i), p))
             continue;
         // 4. limit and early depth test; the sign bit of -0 is dropped
         uint pixel = uint(int(floor(y)) - view.origin_y) * view.width + uint(int(floor(x)) - view.origin_x);

@@ -6,6 +6,7 @@
 
 #include "lib/ranges.glsl"
 #include "lib/planes.glsl"
+#include "lib/points.glsl"
 
 #if STEP == 0
 layout(local_size_x = 64) in;
@@ -37,14 +38,6 @@ float reach_of(view_args view, float gamma, float z)
 
 #if STEP == 0
 
-bool faces_away(uint word, vec4 eye, vec3 p)
-{
-    if ((word & PT_NORMAL_BITS) == PT_NORMAL_NONE)
-        return false;
-    precise vec3 v = eye.xyz - eye.w * p;
-    return pt_dot(pt_decode_normal(word), v) <= 0.0;
-}
-
 void add(uint at, float term)
 {
     int value = int(term);
@@ -71,21 +64,15 @@ bool pt_point_of(chunk_view chunk, uint i, out pt_cell_point point)
     // 1. where it lies
     uint at = 3u * (chunk.first - first_slot) + i;
     vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
-    precise float z = (((chunk.lo[2] + chunk.row[6] * p.x) + chunk.row[7] * p.y) + chunk.row[8] * p.z) + chunk.hi[2];
-    precise float x = (((chunk.lo[0] + chunk.row[0] * p.x) + chunk.row[1] * p.y) + chunk.row[2] * p.z) + chunk.hi[0];
-    precise float y = (((chunk.lo[1] + chunk.row[3] * p.x) + chunk.row[4] * p.y) + chunk.row[5] * p.z) + chunk.hi[1];
-    if (view.perspective != 0u) {
-        float r = pt_rcp(z);
-        x = x * r;
-        y = y * r;
-    }
+    vec3 seen = pt_project(view, chunk, p);
+    float x = seen.x, y = seen.y, z = seen.z;
     if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
         return false;
     if (args.sifted != 0u && chunk.sifted != 0u &&
         (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
         return false;
     point.id = chunk.first + i;
-    if (chunk.cull != 0u && faces_away(surface[point.id], vec4(chunk.eye[0], chunk.eye[1], chunk.eye[2], chunk.eye[3]), p))
+    if (chunk.cull != 0u && pt_faces_away(chunk, surface[point.id], p))
         return false;
     // 2. on the nearest surface of its cell
     point.x = x;

@@ -10,8 +10,8 @@
 
 #include "shared/discs.h"
 #include "shared/words.h"
-#include "lib/math.glsl"
 #include "lib/planes.glsl"
+#include "lib/points.glsl"
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
@@ -281,14 +281,8 @@ bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
         (read_word(chunk.sifted - 1u + slot / PT_SLOTS_A_WORD) >> slot % PT_SLOTS_A_WORD & 1u) == 0u)
         return false;
     vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
-    precise float z = (((chunk.lo[2] + chunk.row[6] * p.x) + chunk.row[7] * p.y) + chunk.row[8] * p.z) + chunk.hi[2];
-    precise float x = (((chunk.lo[0] + chunk.row[0] * p.x) + chunk.row[1] * p.y) + chunk.row[2] * p.z) + chunk.hi[0];
-    precise float y = (((chunk.lo[1] + chunk.row[3] * p.x) + chunk.row[4] * p.y) + chunk.row[5] * p.z) + chunk.hi[1];
-    if (view.perspective != 0u) {
-        float r = pt_rcp(z);
-        x = x * r;
-        y = y * r;
-    }
+    vec3 seen = pt_project(view, chunk, p);
+    float x = seen.x, y = seen.y, z = seen.z;
     // NaN fails every comparison
     if (!(view.z_near <= z && z <= view.z_far && pt_abs(x) < PT_DISC_FAR && pt_abs(y) < PT_DISC_FAR))
         return false;
@@ -297,11 +291,8 @@ bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
     d.z = z;
     d.id = chunk.first + slot;
     uint word = surface[d.id];
-    if (chunk.cull != 0u && (word & PT_NORMAL_BITS) != PT_NORMAL_NONE) {
-        precise vec3 towards = vec3(chunk.eye[0], chunk.eye[1], chunk.eye[2]) - chunk.eye[3] * p;
-        if (pt_dot(pt_decode_normal(word), towards) <= 0.0)
-            return false;
-    }
+    if (chunk.cull != 0u && pt_faces_away(chunk, word, p))
+        return false;
     disc_size(d.id, word, d);
     vec2 low, high;
     if (!disc_box(view, d, low, high))

@@ -4,7 +4,7 @@
 #ifndef PT_PLANES_GLSL
 #define PT_PLANES_GLSL
 
-#include "shared/view.h"
+#include "lib/math.glsl"
 
 // An invocation walks a line of pixels. On a GPU neighbours in a row share what they fetch at once, and walk up. llvmpipe takes
 // its lanes one after the other, and processors fetch ahead of who walks along a row: smoothing takes 7.7 ms in place of 11.9.

@@ -6,6 +6,7 @@
 // side by side, 32 bits wide, and are emptied into 64 before they could overflow.
 #include "device_cpu/kernels/shade.h"
 #include "device_cpu/kernels/sums.h"
+#include "device_cpu/points.h"
 #include "device_cpu/rows.h"
 #include "shared/means.h"
 
@@ -118,44 +119,34 @@ static void project(const struct average *average, const struct band *band, cons
     const uint32_t *drawn = average->args->sifted ? PT_DATA(average->call, average, drawn) : NULL;
     const float below = (float)(view->origin_y + (int32_t)band->first) - PT_AVERAGE_WIDEST - 1.0f;
     const float above = (float)(view->origin_y + (int32_t)band->end) + PT_AVERAGE_WIDEST + 1.0f;
-    const vf one = vf_set(1.0f), left = vf_set((float)view->origin_x),
-             right = vf_set((float)(view->origin_x + (int32_t)view->width));
+    const vf one = vf_set(1.0f);
     const float bottom = (float)view->origin_y, top = (float)(view->origin_y + (int32_t)view->height);
-    const vf low = vf_set(below > bottom ? below : bottom), high = vf_set(above < top ? above : top);
+    const struct pt_window window = pt_window_rows(view, below > bottom ? below : bottom, above < top ? above : top);
     out->narrow.count = out->middle.count = out->wide.count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
-        const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                         vf_load(positions + 2 * (size_t)chunk->padded + i)};
-        const vf z = vf_transform(chunk, 2, p[0], p[1], p[2]);
-        vf x = vf_transform(chunk, 0, p[0], p[1], p[2]), y = vf_transform(chunk, 1, p[0], p[1], p[2]);
-        if (view->perspective) {
-            const vf r = vf_rcp(z);
-            x = x * r;
-            y = y * r;
-        }
-        vm some = vm_and(vm_and(vf_le(vf_set(view->z_near), z), vf_le(z, vf_set(view->z_far))),
-                         vm_and(vm_and(vf_le(left, x), vf_lt(x, right)), vm_and(vf_le(low, y), vf_lt(y, high))));
-        some = vm_and(some, vm_first(pt_lanes_left(i, last)));
+        vf p[3], at[3];
+        pt_load_points(positions, chunk->padded, i, p);
+        pt_project(view, chunk, p, at);
+        vm some = vm_and(pt_within(&window, at), vm_first(pt_lanes_left(i, last)));
         if (!vm_bits(some))
             continue;
-        if (chunk->sifted)
-            some = vm_and(some, vm_of_bits(drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
+        some = pt_keep_drawn(chunk, drawn, i, some);
         const vi word = vi_load(surface + i);
         if (chunk->cull)
             some = vm_and(some, vm_not(pt_faces_away(chunk, word, p)));
         if (!vm_bits(some))
             continue;
         const vf spacing = vf_gather(average->args->instance.spacing, vi_shr(word, PT_SPACING_SHIFT), some);
-        const vf footprint = vf_select(some, vf_footprint(view, z), one), place[3] = {x, y, z};
+        const vf footprint = vf_select(some, vf_footprint(view, at[2]), one);
         const vf h = vf_max(vf_min((vf_set(PT_AVERAGE_TENT) * spacing) * vf_rcp(footprint), vf_set(PT_AVERAGE_WIDEST)), one);
         const vm narrow = vm_and(some, vf_le(h, one)), wide = vm_and(some, vf_lt(vf_set(1.5f), h));
         const vm middle = vm_and(some, vm_not(vm_or(narrow, wide)));
         if (vm_bits(narrow))
-            keep(&out->narrow, chunk, i, place, h, word, vm_bits(narrow));
+            keep(&out->narrow, chunk, i, at, h, word, vm_bits(narrow));
         if (vm_bits(middle))
-            keep(&out->middle, chunk, i, place, h, word, vm_bits(middle));
+            keep(&out->middle, chunk, i, at, h, word, vm_bits(middle));
         if (vm_bits(wide))
-            keep(&out->wide, chunk, i, place, h, word, vm_bits(wide));
+            keep(&out->wide, chunk, i, at, h, word, vm_bits(wide));
     }
 }
 

@@ -175,8 +175,7 @@ static void pt_bin_chunk(struct pt_bins *bins, uint32_t thread, const struct pt_
     for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
         struct pt_discs discs;
         vf p[3];
-        for (uint32_t k = 0; k < 3; k++)
-            p[k] = vf_load(source->positions + (size_t)k * chunk->padded + i);
+        pt_load_points(source->positions, chunk->padded, i, p);
         pt_disc_project(source, p, vm_first(pt_lanes_left(i, chunk->count)), &discs);
         discs.id = vi_add(vi_set(chunk->first + i), vi_lanes());
         vi word = vi_load(source->surface + i);

@@ -7,6 +7,7 @@
 #include "device_cpu/kernels/ranges.h"
 #include "device_cpu/kernels/shade.h"
 #include "device_cpu/kernels/sums.h"
+#include "device_cpu/points.h"
 
 enum {
     PT_CELL_BLOCK = 256,     // points
@@ -51,38 +52,28 @@ static inline void pt_cells_project(const struct pt_cells *cells, const struct p
     const struct view_args *view = cells->view;
     const float *positions = cells->positions + 3 * (size_t)chunk->first;
     const uint32_t *surface = cells->surface + chunk->first, *drawn = cells->drawn;
-    const vf left = vf_set((float)view->origin_x), right = vf_set((float)(view->origin_x + (int32_t)view->width));
-    const vf low = vf_set((float)(view->origin_y + (int32_t)band->first)),
-             high = vf_set((float)(view->origin_y + (int32_t)band->end));
+    const struct pt_window window = pt_window_rows(view, (float)(view->origin_y + (int32_t)band->first),
+                                                   (float)(view->origin_y + (int32_t)band->end));
     uint32_t count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
-        const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                         vf_load(positions + 2 * (size_t)chunk->padded + i)};
-        const vf z = vf_transform(chunk, 2, p[0], p[1], p[2]);
-        vf x = vf_transform(chunk, 0, p[0], p[1], p[2]), y = vf_transform(chunk, 1, p[0], p[1], p[2]);
-        if (view->perspective) {
-            const vf r = vf_rcp(z);
-            x = x * r;
-            y = y * r;
-        }
-        vm some = vm_and(vm_and(vf_le(vf_set(view->z_near), z), vf_le(z, vf_set(view->z_far))),
-                         vm_and(vm_and(vf_le(left, x), vf_lt(x, right)), vm_and(vf_le(low, y), vf_lt(y, high))));
-        some = vm_and(some, vm_first(pt_lanes_left(i, last)));
-        if (chunk->sifted)
-            some = vm_and(some, vm_of_bits(drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
+        vf p[3], at[3];
+        pt_load_points(positions, chunk->padded, i, p);
+        pt_project(view, chunk, p, at);
+        vm some = vm_and(pt_within(&window, at), vm_first(pt_lanes_left(i, last)));
+        some = pt_keep_drawn(chunk, drawn, i, some);
         if (!vm_bits(some))
             continue;
         if (chunk->cull)
             some = vm_and(some, vm_not(pt_faces_away(chunk, vi_load(surface + i), p)));
-        const vf column = vf_floor(x), row = vf_floor(y);
-        const vi at = vi_add(vi_mul(vi_sub(vf_int(row), vi_set((uint32_t)view->origin_y)), vi_set(view->width)),
-                             vi_sub(vf_int(column), vi_set((uint32_t)view->origin_x)));
+        const vf column = vf_floor(at[0]), row = vf_floor(at[1]);
+        const vi cell = vi_add(vi_mul(vi_sub(vf_int(row), vi_set((uint32_t)view->origin_y)), vi_set(view->width)),
+                               vi_sub(vf_int(column), vi_set((uint32_t)view->origin_x)));
         const uint32_t lanes = vm_bits(some);
-        vi_pack(block->cell + count, at, lanes);
+        vi_pack(block->cell + count, cell, lanes);
         vi_pack(block->id + count, vi_add(vi_set(chunk->first + i), vi_lanes()), lanes);
-        vi_pack((uint32_t *)(void *)(block->x + count), vf_bits(x), lanes);
-        vi_pack((uint32_t *)(void *)(block->y + count), vf_bits(y), lanes);
-        vi_pack((uint32_t *)(void *)(block->z + count), vi_and(vf_bits(z), vi_set(0x7FFFFFFFu)), lanes);
+        vi_pack((uint32_t *)(void *)(block->x + count), vf_bits(at[0]), lanes);
+        vi_pack((uint32_t *)(void *)(block->y + count), vf_bits(at[1]), lanes);
+        vi_pack((uint32_t *)(void *)(block->z + count), vi_and(vf_bits(at[2]), vi_set(0x7FFFFFFFu)), lanes);
         count += (uint32_t)__builtin_popcount(lanes);
     }
     block->count = count;

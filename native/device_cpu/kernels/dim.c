@@ -2,6 +2,7 @@
 // dim: points behind the soft points of a light's view. SPEC 5; twin of shaders/kernels/dim.comp
 //
 // Words of a cloud's points belong to one chunk each, so threads never meet.
+#include "device_cpu/points.h"
 #include "lit_words.h"
 #include "shared/shadows.h"
 
@@ -32,22 +33,16 @@ static inline vi loss_of(const struct dim *dim, const struct chunk_view *chunk, 
     const struct view_args *view = &args->view;
     const float *window = args->window;
     const vf one = vf_set(1.0f), half = vf_set(0.5f);
-    const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                     vf_load(positions + 2 * (size_t)chunk->padded + i)};
+    vf p[3], at[3];
+    pt_load_points(positions, chunk->padded, i, p);
     // 1. project
-    const vf z = vf_transform(chunk, 2, p[0], p[1], p[2]);
-    vf at[2] = {vf_transform(chunk, 0, p[0], p[1], p[2]), vf_transform(chunk, 1, p[0], p[1], p[2])};
-    if (view->perspective) {
-        const vf r = vf_rcp(z);
-        at[0] = at[0] * r;
-        at[1] = at[1] * r;
-    }
+    pt_project(view, chunk, p, at);
     vm inside = vm_and(vm_and(vf_le(vf_set(window[0]), at[0]), vf_lt(at[0], vf_set(window[2]))),
                        vm_and(vf_le(vf_set(window[1]), at[1]), vf_lt(at[1], vf_set(window[3]))));
-    inside = vm_and(lanes, vm_and(inside, vf_le(vf_set(view->z_near), z)));
+    inside = vm_and(lanes, vm_and(inside, vf_le(vf_set(view->z_near), at[2])));
     if (!vm_bits(inside))
         return vi_set(0);
-    const vf deep = vf_select(inside, clamped((z - vf_set(args->veil_from)) * vf_set(args->veil_scale), args->veils),
+    const vf deep = vf_select(inside, clamped((at[2] - vf_set(args->veil_from)) * vf_set(args->veil_scale), args->veils),
                               vf_zero());
     const vf slab = vf_min(vf_floor(deep), vf_set((float)(args->veils - 1)));
     const vi in = vf_int(slab);

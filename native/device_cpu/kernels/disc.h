@@ -10,7 +10,7 @@
 
 #include "device_cpu/cpu.h"
 #include "device_cpu/rows.h"
-#include "device_cpu/vector_math.h"
+#include "device_cpu/points.h"
 #include "shared/discs.h"
 
 // PT_LANES of them.
@@ -155,14 +155,11 @@ static inline void pt_disc_project(const struct pt_disc_source *s, const vf p[3]
 {
     const struct view_args *view = s->view;
     const vf far = vf_set(PT_DISC_FAR);
-    d->z = vf_transform(s->chunk, 2, p[0], p[1], p[2]);
-    d->x = vf_transform(s->chunk, 0, p[0], p[1], p[2]);
-    d->y = vf_transform(s->chunk, 1, p[0], p[1], p[2]);
-    if (view->perspective) {
-        vf r = vf_rcp(d->z);
-        d->x = d->x * r;
-        d->y = d->y * r;
-    }
+    vf at[3];
+    pt_project(view, s->chunk, p, at);
+    d->x = at[0];
+    d->y = at[1];
+    d->z = at[2];
     // NaN fails every comparison
     d->drawn = vm_and(vm_and(lanes, vm_and(vf_le(vf_set(view->z_near), d->z), vf_le(d->z, vf_set(view->z_far)))),
                       vm_and(vf_lt(vf_abs(d->x), far), vf_lt(vf_abs(d->y), far)));
@@ -171,15 +168,8 @@ static inline void pt_disc_project(const struct pt_disc_source *s, const vf p[3]
 // Leaves out those that face away: positions p, surface words.
 static inline void pt_disc_cull(const struct pt_disc_source *s, const vf p[3], vi word, struct pt_discs *d)
 {
-    vf n[3], v[3];
-    if (!s->chunk->cull)
-        return;
-    vf_decode_normal(word, n);
-    for (uint32_t k = 0; k < 3; k++)
-        v[k] = vf_set(s->chunk->eye[k]) - vf_set(s->chunk->eye[3]) * p[k];
-    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
-    vm none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
-    d->drawn = vm_and(d->drawn, vm_not(vm_and(away, vm_not(none))));
+    if (s->chunk->cull)
+        d->drawn = vm_and(d->drawn, vm_not(pt_faces_away(s->chunk, word, p)));
 }
 
 // The half axes of shapes in view space: as covectors, of which offsets in the plane get their share of each half axis when

@@ -2,6 +2,7 @@
 // gather: soft points of an instance -> records, lit: what their balls on screen are made of. SPEC 5, soft; twin of
 // shaders/kernels/gather.comp
 #include "device_cpu/kernels/shade.h"
+#include "device_cpu/points.h"
 #include "shared/balls.h"
 
 struct gather {

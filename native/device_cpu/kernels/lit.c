@@ -2,6 +2,7 @@
 // lit: points against the filled map of a light. [D 6], SPEC 4; twin of shaders/kernels/lit.comp
 //
 // Words of a cloud's points belong to one chunk each, so threads never meet. Lit points are not written at all.
+#include "device_cpu/points.h"
 #include "lit_words.h"
 #include "shared/shadows.h"
 
@@ -31,14 +32,9 @@ static struct fall fall_of(const struct lit *lit, const struct chunk_view *chunk
 {
     const struct view_args *view = &lit->args.view;
     const float *window = lit->args.window;
-    struct fall f = {.z = vf_transform(chunk, 2, p[0], p[1], p[2])};
-    for (uint32_t k = 0; k < 2; k++)
-        f.at[k] = vf_transform(chunk, k, p[0], p[1], p[2]);
-    if (view->perspective) {
-        vf r = vf_rcp(f.z);
-        f.at[0] = f.at[0] * r;
-        f.at[1] = f.at[1] * r;
-    }
+    vf at[3];
+    pt_project(view, chunk, p, at);
+    struct fall f = {.z = at[2], .at = {at[0], at[1]}};
     vm inside = vm_and(vm_and(vf_le(vf_set(window[0]), f.at[0]), vf_lt(f.at[0], vf_set(window[2]))),
                        vm_and(vf_le(vf_set(window[1]), f.at[1]), vf_lt(f.at[1], vf_set(window[3]))));
     inside = vm_and(lanes, vm_and(inside, vf_le(vf_set(view->z_near), f.z)));
@@ -162,13 +158,6 @@ static inline uint32_t loss_at(const struct lit *lit, uint32_t texel)
     return pt_shadow_share(lit->args.loss, opacities[keys[2 * (size_t)texel] - lit->args.caster]);
 }
 
-// Where PT_LANES points of the chunk are, from slot i on.
-static void load_points(const float *positions, uint32_t padded, uint32_t i, vf p[3])
-{
-    for (uint32_t k = 0; k < 3; k++)
-        p[k] = vf_load(positions + k * (size_t)padded + i);
-}
-
 // Queues the points of PT_LANES slots from i on that `lanes` names.
 static void enqueue(struct queue *queue, uint32_t i, const struct fall *fall, uint32_t lanes)
 {
@@ -215,7 +204,7 @@ static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, co
         if (!vm_bits(lanes))
             continue;
         vf p[3];
-        load_points(positions, chunk->padded, i, p);
+        pt_load_points(positions, chunk->padded, i, p);
         const struct fall fall = fall_of(lit, chunk, p, lanes);
         const uint32_t wanted = vm_bits(args->close || args->compare ? lanes : fall.behind); // lit ones too, to look at
         if (wanted)

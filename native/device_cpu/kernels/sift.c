@@ -5,6 +5,7 @@
 // Distances to a clip are sums of products in one written order, as scatter's: what is cut is cut on every device.
 #include "clip.h"
 #include "device_cpu/cpu.h"
+#include "device_cpu/points.h"
 #include "shared/points.h"
 
 struct sift {
@@ -31,8 +32,8 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
     vm keep = vm_of_bits(chunk->clip_keeps ? 0u : ~0u), cut = vm_of_bits(0);
     if (chunk->clip_count) { // else positions need not come from memory, and there may be no clips
         const struct clip_view *clips = (const struct clip_view *)PT_DATA(sift->call, sift, clips) + chunk->clip_first;
-        const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                         vf_load(positions + 2 * (size_t)chunk->padded + i)};
+        vf p[3];
+        pt_load_points(positions, chunk->padded, i, p);
         for (uint32_t k = 0; k < chunk->clip_keeps; k++)
             keep = vm_or(keep, inside(&clips[k], p));
         for (uint32_t k = chunk->clip_keeps; k < chunk->clip_count; k++)
