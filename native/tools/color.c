@@ -165,15 +165,14 @@ static int take_scalars(const patina_file *file, const char *name, patina_cloud 
     return code;
 }
 
-// A built cloud, which patina_cloud_save wrote.
-static int is_saved(const char *path)
+int tool_begins(const char *path, const char *bytes, size_t size)
 {
-    char start[8] = "";
-    FILE *file = pt_stream_open(path, "rb");
-    const int read = file && fread(start, sizeof start, 1, file) == 1;
+    char start[16];
+    FILE *file = size <= sizeof start ? pt_stream_open(path, "rb") : NULL;
+    const int read = file && fread(start, size, 1, file) == 1;
     if (file)
         fclose(file);
-    return read && !memcmp(start, "patina\n\x1a", sizeof start);
+    return read && !memcmp(start, bytes, size);
 }
 
 static int open_saved(const char *path, const struct tool_color *color, const char *attribute, patina_cloud **out)
@@ -198,7 +197,7 @@ int tool_load_cloud(const char *path, const struct tool_color *color, const char
 {
     patina_file *file = NULL;
     uint64_t count;
-    if (is_saved(path))
+    if (tool_begins(path, "patina\n\x1a", 8)) // patina_cloud_save wrote it
         return open_saved(path, color, attribute, out);
     int code = patina_file_open(path, progress, &file);
     if (!code)
@@ -210,7 +209,7 @@ int tool_load_cloud(const char *path, const struct tool_color *color, const char
     if (!code)
         code = tool_take_stations(file, stations);
     if (!code && scans)
-        code = tool_take_scans(file, *out, scans);
+        code = tool_take_scans(file, stations, *out, scans);
     patina_file_destroy(file);
     return code;
 }

@@ -105,16 +105,6 @@ static int parse(int count, char **arguments, struct merge *merge)
     return TOOL_OK;
 }
 
-static int is_keys(const char *path)
-{
-    char start[7] = "";
-    FILE *file = pt_stream_open(path, "rb");
-    const int read = file && fread(start, sizeof start, 1, file) == 1;
-    if (file)
-        fclose(file);
-    return read && !memcmp(start, "patkeys", sizeof start);
-}
-
 // Draws the picture that the first file's options describe.
 static int merge_keys(struct merge *merge)
 {
@@ -154,7 +144,8 @@ int tool_merge(int count, char **arguments)
     struct merge merge = {0};
     int result = parse(count, arguments, &merge);
     if (!result)
-        result = is_keys(merge.files[0]) ? merge_keys(&merge) : tool_merge_tiles(merge.count, merge.files, merge.output);
+        result = tool_begins(merge.files[0], "patkeys", 7) ? merge_keys(&merge)
+                                                           : tool_merge_tiles(merge.count, merge.files, merge.output);
     free(merge.more);
     return result;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Premultiplied linear float RGBA -> 8-bit sRGB PNG, row by row from the top, so that a picture need not be in memory whole. The same
 // rows make the same bytes, however many are written at a time.
+#include "png_errors.h"
 #include "tool.h"
 #include "base/elementary.h"
 
 #include <errno.h>
-#include <png.h>
 #include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@ struct tool_png {
     png_infop info;
     uint32_t width;
     int alpha, failed;
-    char why[256];
+    char why[TOOL_PNG_WHY];
     uint8_t *row;
 };
 
@@ -53,14 +53,13 @@ static void encode_row(uint8_t *row, const float *pixels, uint32_t width, int al
     }
 }
 
-static void on_error(png_structp state, png_const_charp text)
+void tool_png_error(png_structp state, png_const_charp text)
 {
-    struct tool_png *png = png_get_error_ptr(state);
-    snprintf(png->why, sizeof png->why, "%s", text);
+    snprintf(png_get_error_ptr(state), TOOL_PNG_WHY, "%s", text);
     longjmp(*png_set_longjmp_fn(state, longjmp, sizeof(jmp_buf)), 1);
 }
 
-static void on_warning(png_structp state, png_const_charp text)
+void tool_png_warning(png_structp state, png_const_charp text)
 {
     (void)state;
     (void)text;
@@ -68,7 +67,7 @@ static void on_warning(png_structp state, png_const_charp text)
 
 static int begin(struct tool_png *png, uint32_t height, const char *name, const char *text)
 {
-    png->state = png_create_write_struct(PNG_LIBPNG_VER_STRING, png, on_error, on_warning);
+    png->state = png_create_write_struct(PNG_LIBPNG_VER_STRING, png->why, tool_png_error, tool_png_warning);
     png->info = png->state ? png_create_info_struct(png->state) : NULL;
     if (!png->info)
         return -1;

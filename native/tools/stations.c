@@ -57,6 +57,7 @@ int tool_take_stations(const patina_file *file, struct tool_stations *out)
     code = read_numbers(file, "scan", &scan);
     if (!code && !scan && (info.stations != 1 && info.scans != 1))
         return PATINA_OK; // whose points are whose is not known
+    out->told = scan != NULL;
     out->count = info.stations;
     out->places = malloc(3 * sizeof(double) * info.stations + 1);
     out->station = calloc(info.count + 1, sizeof *out->station);
@@ -74,21 +75,18 @@ int tool_take_stations(const patina_file *file, struct tool_stations *out)
     return code ? code : read_numbers(file, "column", &out->column);
 }
 
-int tool_take_scans(const patina_file *file, const patina_cloud *cloud, struct tool_scans *out)
+int tool_take_scans(const patina_file *file, const struct tool_stations *stations, const patina_cloud *cloud,
+                    struct tool_scans *out)
 {
     patina_file_info info = {.struct_size = sizeof info};
-    int32_t *scan = NULL;
     *out = (struct tool_scans){0};
     int code = patina_file_get_info(file, &info);
-    if (code || !info.scans || info.scans > UINT16_MAX || !info.count)
+    if (code || !info.scans || !stations->station || !info.count)
         return code;
-    code = read_numbers(file, "scan", &scan);
-    if (!code && !scan && info.scans > 1)
+    if (!stations->told && info.scans > 1)
         return PATINA_OK; // whose points are whose is not known
     patina_scan *known = calloc(info.scans, sizeof *known);
-    uint16_t *of = scan ? malloc(info.count * sizeof *of) : NULL;
-    if (!code && (!known || (scan && !of)))
-        code = PATINA_ERROR_MEMORY;
+    code = known ? PATINA_OK : PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < info.scans && !code; i++) {
         patina_file_scan told = {.struct_size = sizeof told};
         code = patina_file_get_scan(file, i, &told);
@@ -98,12 +96,8 @@ int tool_take_scans(const patina_file *file, const patina_cloud *cloud, struct t
             out->directed |= told.direction[k] != 0.0;
         }
     }
-    for (uint64_t i = 0; i < info.count && scan && !code; i++)
-        of[i] = scan[i] >= 0 && scan[i] < UINT16_MAX ? (uint16_t)scan[i] : UINT16_MAX;
     if (!code)
-        code = patina_scans_create(cloud, of, known, info.scans, &out->made);
-    free(scan);
-    free(of);
+        code = patina_scans_create(cloud, stations->station, known, info.scans, &out->made);
     free(known);
     return code;
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tiles of one still: `patina render --tiles 4x4 --tile N` draws one of them, a border of the whole picture; `patina merge` puts their
 // rows beside each other, a row of pixels at a time.
+#include "png_errors.h"
 #include "tool.h"
 
-#include <png.h>
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,21 +45,8 @@ struct tile {
     FILE *file;
     png_structp state;
     png_infop info;
-    char why[256];
+    char why[TOOL_PNG_WHY];
 };
-
-static void on_error(png_structp state, png_const_charp text)
-{
-    struct tile *tile = png_get_error_ptr(state);
-    snprintf(tile->why, sizeof tile->why, "%s", text);
-    longjmp(*png_set_longjmp_fn(state, longjmp, sizeof(jmp_buf)), 1);
-}
-
-static void on_warning(png_structp state, png_const_charp text)
-{
-    (void)state;
-    (void)text;
-}
 
 static void close_tile(struct tile *tile)
 {
@@ -98,7 +85,7 @@ static int open_tile(struct tile *tile)
         tool_say("'%s' cannot be opened", tile->path);
         return -1;
     }
-    tile->state = png_create_read_struct(PNG_LIBPNG_VER_STRING, tile, on_error, on_warning);
+    tile->state = png_create_read_struct(PNG_LIBPNG_VER_STRING, tile->why, tool_png_error, tool_png_warning);
     tile->info = tile->state ? png_create_info_struct(tile->state) : NULL;
     if (!tile->info) {
         tool_say("out of memory");

@@ -143,6 +143,9 @@ int tool_set_soft(const struct tool_soft *soft, int file, const patina_cloud *cl
 // An option of tool_color: 0 taken, -1 a bad value, 1 none of them.
 int tool_parse_color(const char *name, const char *value, struct tool_color *color);
 
+// Whether a file can be read and begins with these bytes, 16 at most.
+int tool_begins(const char *path, const char *bytes, size_t size);
+
 // ---- clouds --------------------------------------------------------------------------------------------------------
 
 // What a file knows of its scanner; station NULL: nothing.
@@ -150,6 +153,7 @@ struct tool_stations {
     uint32_t count, direction_count; // of stations; of scans whose beams are parallel, where there is no station
     double *places, *directions;
     uint16_t *station;     // scan of each point
+    int told;              // by the file; 0: there is one scan, and all are of it
     int32_t *row, *column; // NULL: not known
 };
 
@@ -160,7 +164,9 @@ struct tool_scans {
     int directed;       // of one at least it is known in which direction the scanner looked
 };
 
-int tool_take_scans(const patina_file *file, const patina_cloud *cloud, struct tool_scans *out); // a patina_error
+// stations: of the same file. A patina_error.
+int tool_take_scans(const patina_file *file, const struct tool_stations *stations, const patina_cloud *cloud,
+                    struct tool_scans *out);
 // Into the description of an analysis, which needs them until it is done.
 void tool_describe_stations(const struct tool_stations *stations, patina_analysis_desc *desc);
 // Its grids tell what every point knows, or a line of standard error says that there are none.

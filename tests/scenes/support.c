@@ -84,6 +84,16 @@ patina_device *support_device_open(const char *name, uint32_t threads, uint32_t 
     return NULL;
 }
 
+void support_each_device(void (*work)(patina_device *device, const char *name))
+{
+    for (uint32_t k = 0; k < support_device_count(); k++) {
+        patina_device *device = support_device_open(support_device_name(k), 0, 0);
+        if (device)
+            work(device, support_device_name(k));
+        patina_device_destroy(device);
+    }
+}
+
 patina_device *support_device_first(void)
 {
     patina_device *device = support_device_open(chosen[0], 0, 0);

@@ -37,6 +37,8 @@ patina_device *support_device_open(const char *name, uint32_t threads, uint32_t 
 // The device for tests that measure a picture and need one device only (all give the same): the first asked for.
 // Skips the test when it cannot be had.
 patina_device *support_device_first(void);
+// Does the work on each device that can be had here, one after another.
+void support_each_device(void (*work)(patina_device *device, const char *name));
 int support_is_gl(const char *name);
 
 // ---- cameras -------------------------------------------------------------------------------------------------------

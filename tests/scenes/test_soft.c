@@ -231,16 +231,6 @@ static void hold(patina_device *device, const char *device_name, int which, int 
     patina_cloud_destroy(cloud);
 }
 
-static void each_device(void (*work)(patina_device *device, const char *name))
-{
-    for (uint32_t k = 0; k < support_device_count(); k++) {
-        patina_device *device = support_device_open(support_device_name(k), 0, 0);
-        if (device)
-            work(device, support_device_name(k));
-        patina_device_destroy(device);
-    }
-}
-
 static void hold_all(patina_device *device, const char *name)
 {
     static const double scales[] = {1.0, 0x1p-10, 0x1p10}; // radii stay what a field holds
@@ -258,7 +248,7 @@ static void hold_all(patina_device *device, const char *name)
 static void test_quadrature(void **state)
 {
     (void)state;
-    each_device(hold_all);
+    support_each_device(hold_all);
 }
 
 // ---- among others ----------------------------------------------------------------------------------------------------------
@@ -346,7 +336,7 @@ static void stand(patina_device *device, const char *name)
 static void test_wall(void **state)
 {
     (void)state;
-    each_device(stand);
+    support_each_device(stand);
 }
 
 // One ball that a wall cuts: what lies before the wall, no more.
@@ -391,7 +381,7 @@ static void cut(patina_device *device, const char *name)
 static void test_cut(void **state)
 {
     (void)state;
-    each_device(cut);
+    support_each_device(cut);
 }
 
 // ---- one result ----------------------------------------------------------------------------------------------------------
@@ -445,7 +435,7 @@ static void regions(patina_device *device, const char *name)
 static void test_regions(void **state)
 {
     (void)state;
-    each_device(regions);
+    support_each_device(regions);
 }
 
 static void test_devices(void **state)
@@ -681,8 +671,8 @@ static void divide(patina_device *device, const char *name)
 static void test_glass(void **state)
 {
     (void)state;
-    each_device(see_through);
-    each_device(divide);
+    support_each_device(see_through);
+    support_each_device(divide);
 }
 
 // ---- what is asked for -----------------------------------------------------------------------------------------------------
@@ -762,7 +752,7 @@ static void sifted(patina_device *device, const char *name)
 static void test_sifted(void **state)
 {
     (void)state;
-    each_device(sifted);
+    support_each_device(sifted);
 }
 
 // A radius of the points' own distances: the same picture in millimetres and metres.
@@ -799,7 +789,7 @@ static void units(patina_device *device, const char *name)
 static void test_units(void **state)
 {
     (void)state;
-    each_device(units);
+    support_each_device(units);
 }
 
 int main(int argc, char **argv)

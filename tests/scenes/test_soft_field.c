@@ -127,16 +127,6 @@ static uint32_t differing(const struct picture *a, const struct picture *b)
     return count;
 }
 
-static void each_device(void (*work)(patina_device *device, const char *name))
-{
-    for (uint32_t k = 0; k < support_device_count(); k++) {
-        patina_device *device = support_device_open(support_device_name(k), 0, 0);
-        if (device)
-            work(device, support_device_name(k));
-        patina_device_destroy(device);
-    }
-}
-
 // One cloud by its field is two of its points, masked: those drawn as ever, whose shadows fall, and those all soft. Byte for byte.
 static void divide(patina_device *device, const char *name)
 {
@@ -165,7 +155,7 @@ static void divide(patina_device *device, const char *name)
 static void test_divide(void **state)
 {
     (void)state;
-    each_device(divide);
+    support_each_device(divide);
 }
 
 // One field serves every threshold, in one frame that keeps its shadows: as if drawn anew. At 1 nothing is soft.
@@ -199,7 +189,7 @@ static void move(patina_device *device, const char *name)
 static void test_threshold(void **state)
 {
     (void)state;
-    each_device(move);
+    support_each_device(move);
 }
 
 // Where every F lies as far above the threshold, W of [S Eq. 22] is that of modulation; at l_m and beyond, none is.
@@ -241,7 +231,7 @@ static void modulate(patina_device *device, const char *name)
 static void test_modulation(void **state)
 {
     (void)state;
-    each_device(modulate);
+    support_each_device(modulate);
 }
 
 // Numbers that the library finds are those that a caller would.

@@ -149,16 +149,6 @@ static struct errors compare(const struct stage *stage, const patina_light_desc 
     return errors;
 }
 
-static void each_device(void (*work)(patina_device *device, const char *name))
-{
-    for (uint32_t k = 0; k < support_device_count(); k++) {
-        patina_device *device = support_device_open(support_device_name(k), 0, 0);
-        if (device)
-            work(device, support_device_name(k));
-        patina_device_destroy(device);
-    }
-}
-
 static void hold(patina_device *device, const char *name)
 {
     static const char *const lights[] = {"sun", "lamp", "lamp inside"};
@@ -184,7 +174,7 @@ static void hold(patina_device *device, const char *name)
 static void test_truth(void **state)
 {
     (void)state;
-    each_device(hold);
+    support_each_device(hold);
 }
 
 // Devices agree to a step of 255 and how many samples there are of it.
@@ -339,7 +329,7 @@ static void pictures(patina_device *device, const char *name)
 static void test_pictures(void **state)
 {
     (void)state;
-    each_device(pictures);
+    support_each_device(pictures);
 }
 
 int main(int argc, char **argv)

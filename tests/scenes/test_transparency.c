@@ -323,22 +323,12 @@ static struct picture draw_sheets(patina_device *device, const struct sheet *she
     return picture;
 }
 
-static void each_device(void (*work)(patina_device *device))
-{
-    for (uint32_t k = 0; k < support_device_count(); k++) {
-        patina_device *device = support_device_open(support_device_name(k), 0, 0);
-        if (!device)
-            continue;
-        work(device);
-        patina_device_destroy(device);
-    }
-}
-
 static const float *middle(const struct picture *picture) { return picture->combined + 4 * (SIDE / 2 * SIDE + SIDE / 2); }
 
 // Three sheets of glass blend as the sum says, down to the cap.
-static void blend_sheets(patina_device *device)
+static void blend_sheets(patina_device *device, const char *name)
 {
+    (void)name;
     static const struct sheet sheet[PLANES] = {
         {0.0, 0.25f, {0.1f, 0.2f, 0.9f}, NULL}, {2.0, 0.5f, {0.9f, 0.4f, 0.1f}, NULL}, {1.0, 0.7f, {0.2f, 0.8f, 0.3f}, NULL}};
     static const int order[PLANES] = {1, 2, 0}; // from the eye
@@ -364,12 +354,13 @@ static void blend_sheets(patina_device *device)
 static void test_sheets(void **state)
 {
     (void)state;
-    each_device(blend_sheets);
+    support_each_device(blend_sheets);
 }
 
 // d_eff is 0.5 and z about 2.5, where 8 ulp are 2^-19: a sheet that much nearer belongs to the first layer.
-static void part_sheets(patina_device *device)
+static void part_sheets(patina_device *device, const char *name)
 {
+    (void)name;
     for (int side = -1; side <= 1; side += 2) {
         const struct sheet sheet[2] = {{2.0, 0.5f, {1.0f, 0.0f, 0.0f}, NULL},
                                        {1.5 - side * 0x1p-19, 0.5f, {0.0f, 1.0f, 0.0f}, NULL}};
@@ -385,12 +376,13 @@ static void part_sheets(patina_device *device)
 static void test_layer_distance(void **state)
 {
     (void)state;
-    each_device(part_sheets);
+    support_each_device(part_sheets);
 }
 
 // Exactly 0: objects and points are not there. Exactly 1: one layer, the picture of opaque things.
-static void exact_opacities(patina_device *device)
+static void exact_opacities(patina_device *device, const char *name)
 {
+    (void)name;
     static float none[SIDE * SIDE], all[SIDE * SIDE], odd[SIDE * SIDE];
     for (int i = 0; i < SIDE * SIDE; i++) {
         all[i] = 1.0f + (float)(i % 3); // clamped
@@ -436,7 +428,7 @@ static void exact_opacities(patina_device *device)
 static void test_exact_opacities(void **state)
 {
     (void)state;
-    each_device(exact_opacities);
+    support_each_device(exact_opacities);
 }
 
 // Depth, normal, source and keys show the first layer, whatever its opacity.
