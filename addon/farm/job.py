@@ -89,20 +89,17 @@ def write(folder: Path, job: dict) -> None:
         beside = folder / f"{name}.part"
         beside.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         os.replace(beside, folder / name)
-    lines = [f"{farm}:\n    {command}\n" for farm, command in commands_of(folder).items()]
+    lines = [f"{farm}:\n    {command}\n" for farm, command in commands_of(folder, job).items()]
     (folder / "README.txt").write_text(f"A job of Patina: {job['name']}, {job['kind']}\n\n{''.join(lines)}\n{ABOUT}", encoding="utf-8")
 
 
-def commands_of(folder: Path) -> dict:
+def commands_of(folder: Path, job: dict) -> dict:
     """How each farm is told; what there is to say."""
+    last = template_of(job)["steps"][-1]["name"]
     return {"Slurm": f"python3 {shlex.quote(str(folder / 'slurm.py'))}",
-            "Open Job Description": f"openjd run {shlex.quote(str(folder / 'template.json'))} --step '{_last_step(folder)}' --run-dependencies",
+            "Open Job Description": f"openjd run {shlex.quote(str(folder / 'template.json'))} --step '{last}' --run-dependencies",
             "Flamenco": f"job type patina.js, settings of {folder / 'flamenco.json'}",
             "this machine": f"python3 {shlex.quote(str(folder / 'task.py'))} check"}
-
-
-def _last_step(folder: Path) -> str:
-    return json.loads((folder / "template.json").read_text("utf-8"))["steps"][-1]["name"]
 
 
 # ---- of the command line ---------------------------------------------------------------------------------------------
@@ -180,7 +177,7 @@ def main() -> int:
     except OSError as error:
         print(f"patina job: {error.filename}: {error.strerror}", file=sys.stderr)
         return 1
-    for farm, command in commands_of(folder).items():
+    for farm, command in commands_of(folder, job).items():
         print(f"{farm}: {command}")
     return 0
 

@@ -283,6 +283,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     items: list[CloudItem | meshes.MeshItem] = []
     taken: dict[tuple, native.Cloud | Pending | meshes.Faces | None] = {}  # by place in memory: it holds while the depsgraph does
     identities: dict[tuple, tuple] = {}  # by place
+    used: set[tuple] = set()  # of them
     faces: set[str] = set()
     triangles = meshes.BARE if roles.are_used(depsgraph) or _wants_mattes(depsgraph.view_layer_eval) else meshes.TRIANGLES
     unknown = roles.Unknown(depsgraph.view_layer_eval)
@@ -313,7 +314,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
         place = link.identity() if link else (obj.data.as_pointer(), radius, faces_as, *_attribute_names(obj), analysis.wanted(obj))
         place = (*place, *meshes.names_of(obj)) if solid else place
         if place not in identities:
-            identities[place] = place if link else _identity(obj, set(identities.values()), radius, faces_as)
+            identities[place] = place if link else _identity(obj, used, radius, faces_as)
+            used.add(identities[place])
         if (place, analyzed) not in taken:
             taken[place, analyzed] = take(obj, identities[place], link, analyzed)
         cloud = taken[place, analyzed]
@@ -338,7 +340,6 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
              for item in items]
-    used = set(identities.values())
     CACHE.trim(used)
     meshes.CACHE.trim(used)
     images.CACHE.trim()

@@ -93,6 +93,14 @@ struct tests {
     struct lit_args args;
 };
 
+static void say_who(struct pt_pass *pass, uint32_t instance)
+{
+    if (instance == PT_PIXELS)
+        PT_REASON(pass, "pixels that show meshes are tested");
+    else
+        PT_REASON(pass, "points of instance %u are tested", instance);
+}
+
 // Behind soft points: with what the surfaces' tests are asked.
 static void add_dim(struct tests *tests, uint32_t instance, const struct lit_args *lit, struct pt_ref positions)
 {
@@ -116,10 +124,7 @@ static void add_dim(struct tests *tests, uint32_t instance, const struct lit_arg
                                   {PT_OF_FLAG, PT_FLAG_DIFFERS, 0}};
     map->receiver_count++;
     struct pt_pass *pass = pt_add(&tests->builder, PT_KERNEL_dim, "lit", &args, sizeof args, refs, sizeof refs / sizeof *refs);
-    if (instance == PT_PIXELS)
-        PT_REASON(pass, "pixels that show meshes are tested");
-    else
-        PT_REASON(pass, "points of instance %u are tested", instance);
+    say_who(pass, instance);
 }
 
 static int add_lit(struct tests *tests, uint32_t instance, const struct pt_instance *receiver, struct pt_ref positions,
@@ -156,10 +161,7 @@ static int add_lit(struct tests *tests, uint32_t instance, const struct pt_insta
                                   tests->opacities};
     map->receiver_count++;
     struct pt_pass *pass = pt_add(&tests->builder, PT_KERNEL_lit, "lit", &args, sizeof args, refs, sizeof refs / sizeof *refs);
-    if (instance == PT_PIXELS)
-        PT_REASON(pass, "pixels that show meshes are tested");
-    else
-        PT_REASON(pass, "points of instance %u are tested", instance);
+    say_who(pass, instance);
     return PATINA_OK;
 }
 
