@@ -28,7 +28,8 @@ class PatinaRangeProperties(PropertyGroup):
     pixel: FloatProperty(
         name="Pixel Size", override=_OVERRIDE, default=0.0, min=0.0, soft_min=1.0, soft_max=8.0, max=64.0, precision=2,
         description="Pixels of the picture across one of those in which points are merged: larger ones close wider gaps, and blur")
-    use_pixel: switch("pixel", 2.0, "A size of your own; else so that neighboring samples fall into neighboring pixels")
+    use_pixel: switch("pixel", 2.0, "A size of your own; else so that neighboring samples fall into neighboring pixels, of several sizes where "
+                                 "points lie closer here than there")
     sharpness: FloatProperty(
         name="Sharpness", override=_OVERRIDE, default=0.0, min=0.0, soft_min=0.5, max=0.95, precision=2,
         description="A second, finer picture shows where many points share a pixel and at outlines: its pixels are so much smaller. "

@@ -17,7 +17,7 @@ static const uint8_t instance_formats[] = {
     [PT_SIGHTS] = PT_FORMAT_sight,      [PT_MARKS] = PT_FORMAT_mark,         [PT_SHADOWS] = PT_FORMAT_shadow,
     [PT_CLIPS] = PT_FORMAT_clip,        [PT_DRAWN] = PT_FORMAT_bits,         [PT_MASK] = PT_FORMAT_bits,
     [PT_FIELD] = PT_FORMAT_field,       [PT_FIELD_ONE] = PT_FORMAT_field,    [PT_SCANS] = PT_FORMAT_scan,
-    [PT_FINE_CHUNKS] = PT_FORMAT_chunk,
+    [PT_FINE_CHUNKS] = PT_FORMAT_chunk, [PT_FINER_CHUNKS] = PT_FORMAT_chunk, [PT_FINEST_CHUNKS] = PT_FORMAT_chunk,
 };
 static const uint8_t mesh_formats[] = {
     [PT_MESH_VERTICES] = PT_FORMAT_vertex, [PT_MESH_INDICES] = PT_FORMAT_index, [PT_MESH_TEXELS] = PT_FORMAT_texel};

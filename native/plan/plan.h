@@ -127,7 +127,7 @@ _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_S
 
 // PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole; PT_MASK to
 // the instance's mask. PT_FIELD: its field, or 1 where all points are soft, with the points' radii; PT_FIELD_ONE: with radii of 1.
-// PT_SCANS: those of its style. PT_FINE_CHUNKS: in the finer cells of range images.
+// PT_SCANS: those of its style. PT_FINE_CHUNKS, and up to PT_RANGE_FINER of them: in the finer and finer cells of range images.
 enum pt_instance_buffer {
     PT_CHUNKS,
     PT_POSITIONS,
@@ -148,8 +148,11 @@ enum pt_instance_buffer {
     PT_FIELD,
     PT_FIELD_ONE,
     PT_SCANS,
-    PT_FINE_CHUNKS
+    PT_FINE_CHUNKS,
+    PT_FINER_CHUNKS,
+    PT_FINEST_CHUNKS
 };
+enum { PT_RANGE_FINER = PT_FINEST_CHUNKS - PT_FINE_CHUNKS + 1 };
 
 enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
 

@@ -13,9 +13,15 @@
 
 // The side of a cell in spacings of the points on screen: of random points one cell in fifty stays empty.
 #define CELL_SPACINGS 2.0
-#define WIDEST_CELL 32.0  // pixels, automatic: points that lie farther apart are no surface
+#define WIDEST_CELL 32.0 // pixels, automatic: points that lie farther apart are no surface
+#define NESTED 3.0       // cells in the next wider one: of so much wider spacings the narrow ones leave one cell in fifty empty
 #define GAMMA_SAMPLES 2.0 // automatic gamma, in intervals of the samples [K II.B]: 1 to 3
 #define GAMMA_CELLS 2.0f  // and at least so many cells
+
+// Of two passes the first is not sharp where more points share a cell than of a surface that is seen from the front, times this, and where
+// one is seen at less than this cosine, 66 degrees.
+#define CROWDED 2.5f
+#define GRAZED 0.4f
 
 int pt_draws_ranges(const struct patina_scene *scene, const struct pt_instance *instance)
 {
@@ -23,10 +29,27 @@ int pt_draws_ranges(const struct patina_scene *scene, const struct pt_instance *
            !pt_all_soft(instance) && pt_disc_ids(scene);
 }
 
-double pt_range_pixel(const struct patina_scene *scene, const struct pt_instance *instance, double spacing_px)
+// Whether cells follow how far points lie apart, from wide ones to narrow ones.
+static int nests(const struct pt_instance *instance)
 {
-    const double set = (double)instance->style.range_pixel, finer = (double)pt_finer(scene);
-    return set > 0.0 ? set * finer : fmin(fmax(CELL_SPACINGS * spacing_px, 1.0), WIDEST_CELL * finer);
+    return !(instance->style.range_pixel > 0.0f) && !(instance->style.range_sharpness > 0.0f);
+}
+
+uint32_t pt_range_pixels(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_spread *spread,
+                         double pixels[PT_RANGE_FINER + 1])
+{
+    const double set = (double)instance->style.range_pixel, finer = (double)pt_finer(scene),
+                 sharpness = (double)instance->style.range_sharpness;
+    uint32_t count = 1;
+    pixels[0] = set > 0.0 ? set * finer : fmin(fmax(CELL_SPACINGS * spread->most, 1.0), WIDEST_CELL * finer);
+    if (sharpness > 0.0 && pixels[0] * sharpness >= 1.0) // else pixels are as fine
+        pixels[count++] = pixels[0] * sharpness;
+    const double least = fmax(CELL_SPACINGS * spread->least, 1.0);
+    while (nests(instance) && count <= PT_RANGE_FINER && pixels[count - 1] >= NESTED * least) {
+        pixels[count] = pixels[count - 1] / NESTED;
+        count++;
+    }
+    return count;
 }
 
 uint32_t pt_range_reach(double pixel) { return (uint32_t)ceil(2.0 * pixel) + 1; }
@@ -41,8 +64,8 @@ static void set_gamma(const struct patina_scene *scene, const struct pt_instance
     out->gamma_cells = set > 0.0 ? 0.0f : GAMMA_CELLS;
 }
 
-void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
-                    const struct pt_eye *eye, double scale, double pixel, double spacing_px, struct pt_range *out)
+static void place(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
+                  const struct pt_eye *eye, double scale, double pixel, double spacing_px, struct pt_range *out)
 {
     struct view_args *cells = &out->cells;
     const double origin[2] = {plan->view.origin_x, plan->view.origin_y}, size[2] = {plan->view.width, plan->view.height};
@@ -50,7 +73,10 @@ void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, cons
     *cells = plan->view;
     out->pixel = (float)pixel;
     pixel = (double)out->pixel; // kernels divide by the same
-    out->points = spacing_px > 0.0 ? (float)fmax(pixel * pixel / (spacing_px * spacing_px), 1.0) : 1.0f;
+    out->widest = nests(instance) ? pixel : INFINITY;
+    out->most = nests(instance)
+                    ? (float)(CELL_SPACINGS * CELL_SPACINGS * NESTED * NESTED)
+                    : CROWDED * (spacing_px > 0.0 ? (float)fmax(pixel * pixel / (spacing_px * spacing_px), 1.0) : 1.0f);
     out->eye = *eye;
     out->eye.xs *= pixel;
     out->eye.ys *= pixel;
@@ -70,6 +96,16 @@ void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, cons
         plan->cells = across[0] * across[1];
 }
 
+void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
+                    const struct pt_eye *eye, double scale, const double *pixels, uint32_t count,
+                    const struct pt_spread *spread, struct pt_range *out)
+{
+    for (uint32_t k = 0; k < count; k++) {
+        place(scene, plan, instance, eye, scale, pixels[k], spread->middle, &out[k]);
+        out[k].fine = k + 1 < count ? &out[k + 1] : NULL;
+    }
+}
+
 void pt_range_rect(const struct pt_range *range, const double bounds[4], uint32_t pad, uint32_t rect[4])
 {
     const double origin[2] = {range->cells.origin_x, range->cells.origin_y},
@@ -83,11 +119,6 @@ void pt_range_rect(const struct pt_range *range, const double bounds[4], uint32_
 }
 
 // ---- passes ------------------------------------------------------------------------------------------------------------
-
-// Of two passes the first is not sharp where more points share a cell than of a surface that is seen from the front, times this, and where
-// one is seen at less than this cosine, 66 degrees.
-#define CROWDED 2.5f
-#define GRAZED 0.4f
 
 static void add_cells(struct pt_builder *builder, uint32_t i, const struct pt_range *range, struct pt_ref chunks, int behind)
 {
@@ -152,7 +183,8 @@ static void add_differences(struct pt_builder *builder, uint32_t i, const struct
 static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_range *range, struct pt_ref chunks, uint32_t pass,
                       int behind)
 {
-    static const char *const told[] = {"", ", marked where they are not sharp", ", where those before were not sharp"};
+    static const char *const told[] = {"", ", marked where they are not sharp", ", where those before were not sharp",
+                                       ", where those before were not sharp, marked too"};
     const struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     const struct incline_args incline = {.view = range->cells, .gamma = range->gamma, .gamma_cells = range->gamma_cells};
@@ -173,7 +205,7 @@ static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_ra
                                          .pass = pass,
                                          .id_base = instance->args.id_base,
                                          .id_count = instance->args.id_count,
-                                         .most = CROWDED * range->points,
+                                         .most = range->most,
                                          .cosine = GRAZED,
                                          .with_apart = (uint32_t)apart};
     PT_REASON(PT_ADD(builder, magnify, magnify,
@@ -189,13 +221,16 @@ static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_ra
 static void add_range(struct pt_builder *builder, uint32_t i, int behind)
 {
     const struct pt_range *range = builder->plan->instances[i].range;
-    const struct pt_ref chunks = pt_buffer_of(PT_CHUNKS, i), fine = pt_buffer_of(PT_FINE_CHUNKS, i);
-    add_cells(builder, i, range, chunks, behind);
-    add_faces(builder, i, range, chunks, range->fine ? PT_RANGE_COARSE : PT_RANGE_ALONE, behind);
-    if (!range->fine)
-        return;
-    add_cells(builder, i, range->fine, fine, behind);
-    add_faces(builder, i, range->fine, fine, PT_RANGE_FINE, behind);
+    struct pt_ref chunks = pt_buffer_of(PT_CHUNKS, i);
+    uint32_t pass = PT_RANGE_ALONE;
+    for (enum pt_instance_buffer next = PT_FINE_CHUNKS; range; range = range->fine, chunks = pt_buffer_of(next++, i)) {
+        const int finer = range->fine && range->fine->chunk_count;
+        add_cells(builder, i, range, chunks, behind);
+        add_faces(builder, i, range, chunks, pass | (finer ? PT_RANGE_COARSE : 0), behind);
+        if (!finer)
+            return;
+        pass = PT_RANGE_FINE;
+    }
 }
 
 void pt_plan_reveal(struct pt_builder *builder)

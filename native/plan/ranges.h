@@ -12,20 +12,31 @@ struct pt_range {
     struct pt_eye eye;      // whose pixels the cells are
     float pixel;            // of a cell: pixels of the picture
     float gamma, gamma_cells;
-    float points;              // that a cell holds of a surface seen from the front
-    struct pt_range *fine;     // of two passes: the finer cells, and
-    struct chunk_view *chunks; // what of the instance's chunks they are to them; NULL: of the instance
+    float most;            // points of a cell, beyond which finer ones take its place
+    struct pt_range *fine; // the next finer cells, or NULL
+    // Of finer cells: those of the instance's chunks whose points lie no farther apart on screen than `widest`, as they see them.
+    double widest;
+    struct chunk_view *chunks;
+    uint32_t chunk_count;
+};
+
+// Of the covered area so much has points that lie closer on screen.
+struct pt_spread {
+    double least, middle, most; // pixels at 1, 50 and 95 %
 };
 
 // Whether the instance is. Not where 32 bits hold no ids for it: it is filled then.
 int pt_draws_ranges(const struct patina_scene *scene, const struct pt_instance *instance);
-// The side of its cells, from the spacing of its points on screen: pixels.
-double pt_range_pixel(const struct patina_scene *scene, const struct pt_instance *instance, double spacing_px);
+// The side of its cells, from the spacing of its points on screen, and of finer ones that take their place: pixels. Returns how many
+// there are, 1 to PT_RANGE_FINER + 1.
+uint32_t pt_range_pixels(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_spread *spread,
+                         double pixels[PT_RANGE_FINER + 1]);
 // How far from a point its faces go, pixels.
 uint32_t pt_range_reach(double pixel);
-// Once plan->view is chosen. eye: of the padded picture; scale: of the object.
+// Once plan->view is chosen: `count` image buffers, each finer than the one before. eye: of the padded picture; scale: of the object.
 void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
-                    const struct pt_eye *eye, double scale, double pixel, double spacing_px, struct pt_range *out);
+                    const struct pt_eye *eye, double scale, const double *pixels, uint32_t count,
+                    const struct pt_spread *spread, struct pt_range *out);
 // The cells of what lies in bounds, in pixels of a picture padded by `pad` less.
 void pt_range_rect(const struct pt_range *range, const double bounds[4], uint32_t pad, uint32_t rect[4]);
 

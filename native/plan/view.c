@@ -123,14 +123,20 @@ static double chunk_cosine(int known, double angle, double spread)
 
 // ---- the chunks in view ------------------------------------------------------------------------------------------------
 
+struct cells { // of an instance that is drawn as range images; count 0: it is not
+    struct pt_spread spread;
+    double pixels[PT_RANGE_FINER + 1];
+    uint32_t count;
+};
+
 struct survey {
     struct pt_eye camera;
     struct pt_sieve *sieves; // per instance
     struct pt_object *objects;
     struct seen **seen; // per instance
     uint32_t *seen_count;
-    int points, discs;         // some chunk's points are drawn as such
-    double *pixels, *spacings; // per instance: of a cell, where they are range images, else 0; of its points
+    int points, discs;   // some chunk's points are drawn as such
+    struct cells *cells; // per instance
 };
 
 static int is_transparent(const struct pt_instance *instance)
@@ -255,9 +261,9 @@ static uint32_t weigh_chunks(const struct survey *survey, uint32_t first, uint32
     return count;
 }
 
-// The spacing on screen that 95% of the covered area stays below. What faces away counts only where nothing faces us: the
+// What spacing on screen so much of the covered area stays below; unchanged where nothing is covered. What faces away counts only where nothing faces us: the
 // sparse back of a statue is hidden by its front.
-static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32_t end, double *middle, double *most)
+static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32_t end, struct pt_spread *out)
 {
     uint32_t count = 0, total = 0;
     double area = 0.0, sum = 0.0;
@@ -270,10 +276,12 @@ static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32
         count = weigh_chunks(survey, first, end, away, list, &area);
     qsort(list, count, sizeof *list, compare_weighted);
     for (uint32_t k = 0; k < count && sum <= 0.95 * area; k++) {
+        if (sum <= 0.01 * area)
+            out->least = list[k].value;
         if (sum <= 0.5 * area)
-            *middle = list[k].value;
+            out->middle = list[k].value;
         sum += list[k].weight;
-        *most = list[k].value;
+        out->most = list[k].value;
     }
     free(list);
     return PATINA_OK;
@@ -282,18 +290,16 @@ static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32
 // The cells of what is drawn as range images.
 static int choose_cells(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
 {
-    survey->pixels = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->pixels);
-    survey->spacings = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->spacings);
-    int error = survey->pixels && survey->spacings ? PATINA_OK : PATINA_ERROR_MEMORY;
+    survey->cells = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->cells);
+    int error = survey->cells ? PATINA_OK : PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < scene->instance_count && !error; i++) {
-        double middle = 0.0, most = 0.0;
-        survey->pixels[i] = 0.0;
+        struct cells *cells = &survey->cells[i];
+        *cells = (struct cells){0};
         if (!pt_draws_ranges(scene, &scene->instances[i]))
             continue;
-        error = spacing_on_screen(survey, i, i + 1, &middle, &most);
-        survey->pixels[i] = pt_range_pixel(scene, &scene->instances[i], most);
-        survey->spacings[i] = middle;
-        const uint32_t reach = pt_range_reach(survey->pixels[i]);
+        error = spacing_on_screen(survey, i, i + 1, &cells->spread);
+        cells->count = pt_range_pixels(scene, &scene->instances[i], &cells->spread, cells->pixels);
+        const uint32_t reach = pt_range_reach(cells->pixels[0]);
         plan->range_reach = reach > plan->range_reach && survey->seen_count[i] ? reach : plan->range_reach;
     }
     return error;
@@ -315,9 +321,9 @@ static void set_view(const struct pt_eye *camera, struct view_args *view)
 
 // A chunk of instance i, as it was placed for the coarser cells, in the finer ones.
 static void place_fine(const struct survey *survey, uint32_t i, const struct pt_chunk *chunk, const double bounds[4],
-                       uint32_t guard, struct pt_range *fine, const struct chunk_view *placed, uint32_t at)
+                       uint32_t guard, struct pt_range *fine, const struct chunk_view *placed)
 {
-    struct chunk_view *out = &fine->chunks[at];
+    struct chunk_view *out = &fine->chunks[fine->chunk_count++];
     double rows[9], translation[3];
     uint32_t cells[4];
     *out = *placed;
@@ -337,7 +343,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
 {
     const struct pt_instance *instance = &scene->instances[i];
     const struct pt_eye *eye = range ? &range->eye : &survey->camera;
-    const double faces = range ? (double)pt_range_reach(survey->pixels[i]) : 0.0;
+    const double faces = range ? (double)pt_range_reach(survey->cells[i].pixels[0]) : 0.0;
     out->range = range;
     out->instance = instance;
     out->of = i;
@@ -375,9 +381,9 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         out->chunks[out->chunk_count].row_end = range ? cells[3] : rect[3];
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
             return PATINA_ERROR_MEMORY;
-        if (range && range->fine)
-            place_fine(survey, i, chunk, bounds, plan->guard, range->fine, &out->chunks[out->chunk_count - 1],
-                       out->chunk_count - 1);
+        for (struct pt_range *fine = range ? range->fine : NULL; fine; fine = fine->fine)
+            if (seen->spacing_px <= fine->widest)
+                place_fine(survey, i, chunk, bounds, plan->guard, fine, &out->chunks[out->chunk_count - 1]);
         pt_join_rect(out->rect, rect);
         out->points += count;
         plan->points_scattered += count;
@@ -387,23 +393,19 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     return PATINA_OK;
 }
 
-// As range images, in one pass or two.
+// As range images, in one pass or several.
 static int place_range(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i)
 {
     const struct pt_instance *instance = &scene->instances[i];
-    const double sharpness = (double)instance->style.range_sharpness, fine = survey->pixels[i] * sharpness;
-    struct pt_range *range = pt_arena_take(&plan->arena, 2 * sizeof *range);
+    const struct cells *cells = &survey->cells[i];
+    struct pt_range *range = pt_arena_take(&plan->arena, cells->count * sizeof *range);
     if (!range)
         return PATINA_ERROR_MEMORY;
-    if (sharpness > 0.0 && fine >= 1.0) { // else pixels are as fine
-        range->fine = range + 1;
-        range->fine->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *range->fine->chunks);
-        if (!range->fine->chunks)
+    pt_range_place(scene, plan, instance, &survey->camera, survey->objects[i].scale, cells->pixels, cells->count,
+                   &cells->spread, range);
+    for (struct pt_range *fine = range->fine; fine; fine = fine->fine)
+        if (!(fine->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *fine->chunks)))
             return PATINA_ERROR_MEMORY;
-    }
-    for (int k = 0; k < 2 && (!k || range->fine); k++)
-        pt_range_place(scene, plan, instance, &survey->camera, survey->objects[i].scale, k ? fine : survey->pixels[i],
-                       survey->spacings[i], range + k);
     return place_chunks(scene, plan, survey, i, 1, pt_disc_ids(scene), range, &plan->instances[i]);
 }
 
@@ -415,7 +417,7 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     plan->chunks += cloud->chunk_count;
     plan->chunks_culled += cloud->chunk_count;
     plan->points += cloud->info.count;
-    if (survey->pixels[i] > 0.0)
+    if (survey->cells[i].count)
         return place_range(scene, plan, survey, i);
     int error = place_chunks(scene, plan, survey, i, all, 0, NULL, &plan->instances[i]);
     for (uint32_t k = 0; k < survey->seen_count[i] && !all; k++)
@@ -489,7 +491,12 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     for (uint32_t i = 0; i < scene->mesh_count && !plan->map; i++)
         plan->transparent |= scene->meshes[i].style.alpha == PATINA_ALPHA_BLEND && pt_mesh_drawn(scene->meshes[i].mesh);
     survey->camera = bare;
-    return error ? error : spacing_on_screen(survey, 0, plan->instance_count, &plan->spacing_middle, &plan->spacing_px);
+    struct pt_spread spread = {.middle = plan->spacing_middle, .most = plan->spacing_px};
+    if (!error)
+        error = spacing_on_screen(survey, 0, plan->instance_count, &spread);
+    plan->spacing_middle = spread.middle;
+    plan->spacing_px = spread.most;
+    return error;
 }
 
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)

@@ -24,7 +24,8 @@ void pt_binder_close(struct pt_binder *binder)
     const struct pt_plan *plan = binder->plan;
     for (uint32_t i = 0; i < plan->instance_count + plan->soft_entries && binder->instances; i++) {
         binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].chunks);
-        binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].fine);
+        for (int k = 0; k < PT_RANGE_FINER; k++)
+            binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].fine[k]);
     }
     for (uint32_t i = 0; i < plan->receiver_count && binder->receivers; i++)
         binder->device->ops->buffer_destroy(binder->device, &binder->receivers[i].chunks);
@@ -114,12 +115,16 @@ static int bind_instance(struct pt_binder *binder, const struct pt_ref *ref, str
         *out = error ? NULL : &bound->mask->buffers[0];
         return error;
     }
-    if (ref->which == PT_FINE_CHUNKS) {
-        *out = &bound->fine;
-        return bound->fine.size
+    if (ref->which >= PT_FINE_CHUNKS && ref->which < PT_FINE_CHUNKS + PT_RANGE_FINER) {
+        const uint32_t level = ref->which - PT_FINE_CHUNKS;
+        const struct pt_range *fine = planned->range->fine;
+        for (uint32_t k = 0; k < level; k++)
+            fine = fine->fine;
+        *out = &bound->fine[level];
+        return bound->fine[level].size
                    ? PATINA_OK
-                   : binder->device->ops->buffer_create(binder->device, planned->chunk_count * sizeof *planned->chunks,
-                                                        planned->range->fine->chunks, 1, &bound->fine);
+                   : binder->device->ops->buffer_create(binder->device, fine->chunk_count * sizeof *fine->chunks, fine->chunks,
+                                                        1, &bound->fine[level]);
     }
     if (ref->which == PT_SCANS) {
         error = take_scans(binder, bound, planned->instance->style.scans);

@@ -11,7 +11,7 @@
 
 struct pt_bound_instance {
     struct pt_resident *cloud, *mask, *grade, *field, *scans; // NULL: not asked for yet
-    struct pt_buffer chunks, fine;                            // fine: PT_FINE_CHUNKS
+    struct pt_buffer chunks, fine[PT_RANGE_FINER];            // fine: from PT_FINE_CHUNKS on
     int placed;                                               // these are there, if only none
 };
 

@@ -169,13 +169,13 @@ void main()
     for (int k = 0; k < 4; k++)
         take_faces(k % 2 + 3 * (k / 2), false);
     bool loose = !found;
-    if (!found && args.pass != PT_RANGE_FINE)
+    if (!found && (args.pass & PT_RANGE_FINE) == 0u)
         take_places();
     if (!found)
         for (int k = 0; k < 4; k++)
             take_faces(k % 2 + 3 * (k / 2), true);
     uvec2 before = keys[at];
-    bool own = args.pass == PT_RANGE_FINE && before.y < PT_KEY_EMPTY_Z && before.x - args.id_base < args.id_count;
+    bool own = (args.pass & PT_RANGE_FINE) != 0u && before.y < PT_KEY_EMPTY_Z && before.x - args.id_base < args.id_count;
     if (own) { // what may take the place of what is there, whose mark is taken away
         float mark = away_from[at], z = pt_float(before.y), most = step_from(z);
         precise float unmarked = -1.0 - mark, nearer = z - most, near = z + most;
@@ -222,7 +222,7 @@ void main()
     albedo[at] = vec4(color.xyz, pt_min(color.w, 1.0));
     deff[at] = distance;
     away = in_pixel(which) ? 0.0 : away;
-    if (args.pass == PT_RANGE_COARSE && unsharp(which, loose, x, y))
+    if ((args.pass & PT_RANGE_COARSE) != 0u && unsharp(which, loose, x, y))
         away = -1.0 - away;
     away_from[at] = away;
     if (args.with_span != 0u)

@@ -12,8 +12,8 @@
 #define PT_RANGE_STEEP 4.0f
 #define PT_RANGE_DEEPEST 1024.0f // cells behind the nearest point from which on depths of merged points count as that
 #define PT_RANGE_ALONE 0u  // passes of magnify: the only one
-#define PT_RANGE_COARSE 1u // the first of two
-#define PT_RANGE_FINE 2u   // the second, of finer cells
+#define PT_RANGE_COARSE 1u // bit: finer cells follow
+#define PT_RANGE_FINE 2u   // bit: wider ones went before
 #define PT_DIFFER_SCANS 4u  // at a time
 #define PT_DIFFER_MOST 1024u // scans beyond share these numbers
 #define PT_RANGE_LEAST 1e-30f // of gamma, and the most
@@ -62,9 +62,9 @@ struct incline_args {
 // cell whose place lies in the pixel; else, so that an outline borders on what lies behind it, the nearest triangle of three cells with a
 // greater step, as far as its farthest corners: nearer ones weigh nothing. normal, albedo: between the corners, in perspective. z likewise. id: of the corner that weighs most.
 // d_eff: of a surface whose points are as thick as max(gamma, 2 cells). away: pixels from that corner; 0 where it lies in the pixel.
-// Of two [K II.E] the first marks what is not sharp, by away = -1 - away: where that corner has more points than `most`, is seen at less
-// than `cosine`, lies at an outline, which is where not all cells around are joined to it, or where no face was. The second takes marks
-// away, and puts its faces where nothing of the instance is, where they are a step nearer, and where they are not a step behind a mark.
+// Of two [K II.E], or of several, all but the last mark what is not sharp, by away = -1 - away: where that corner has more points than `most`, is seen at less
+// than `cosine`, lies at an outline, which is where not all cells around are joined to it, or where no face was. All but the first take marks
+// away, and put their faces where nothing of the instance is, where they are a step nearer, and where they are not a step behind a mark.
 struct magnify_args {
     struct view_args view; // of the picture
     struct view_args cells;
@@ -73,9 +73,9 @@ struct magnify_args {
     float d_min; // as in instance_args
     uint32_t behind; // 1: the limit plane holds
     uint32_t with_span; // as in surface_args
-    uint32_t pass;      // PT_RANGE_*
+    uint32_t pass;      // bits PT_RANGE_*
     uint32_t id_base, id_count; // of the instance
-    float most;         // of two: cells of more points are not sharp
+    float most;         // where finer ones follow: cells of more points are not sharp
     float cosine;       // nor are those that are seen at less of it
     uint32_t with_apart; // 1: the apart plane takes max(most - least, 0) of the corner that weighs most: differ
 };

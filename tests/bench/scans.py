@@ -5,7 +5,7 @@
         [--json FILE] [--add FILE]... [--readme]
 
 MODE: default, stations (the scanners' places are known), free (and what they saw through is left out), grid (and neighbours
-in their grids tell where surfaces end), filling, discs (ours);
+in their grids tell where surfaces end), filling, discs, ranges (ours);
 vtk 1, vtk 3 EDL, … (points of so many pixels); cycles 0.02, eevee 0.02, … (spheres of a radius in metres; EEVEE takes
 minutes a picture on llvmpipe). The default
 is all but eevee. --add: rows of earlier runs, whose modes are not measured again; --readme: the table of figures."""
@@ -37,7 +37,8 @@ from truth.scans.scenes import FOV, HEIGHT, SKY, STEP, WIDTH, Scene  # noqa: E40
 from truth.scans.solids import linear  # noqa: E402
 
 PYTHON = "/usr/bin/python3"  # Debian's, for its VTK
-OURS = {"default": ("on", []), "stations": ("stations", []), "free": ("free", []), "grid": ("grid", []), "filling": ("off", []), "discs": ("off", ["surface=1"])}
+OURS = {"default": ("on", []), "stations": ("stations", []), "free": ("free", []), "grid": ("grid", []), "filling": ("off", []), "discs": ("off", ["surface=1"]),
+        "ranges": ("off", ["surface=3"])}
 CYCLES = ("cycles 0.01", "cycles 0.02", "cycles 0.04")
 VTK = ("vtk 1", "vtk 3", "vtk 5", "vtk 7", "vtk 5 EDL")
 NEAR, FAR = 0.05, 500.0
@@ -132,7 +133,7 @@ def markdown(rows: list[dict[str, Any]]) -> str:
 NAMES = {"default": "Patina", "stations": "Patina, scanners known", "free": "Patina, free space used",
          "grid": "Patina, scanners' grids used",
          "filling": "Patina, filling alone",
-         "discs": "Patina, discs of 1.75 spacings"}
+         "discs": "Patina, discs of 1.75 spacings", "ranges": "Patina, range images"}
 SHOWN = ("default", "stations", "free", "grid", "filling", "discs", *VTK, *CYCLES)  # of the bench
 
 

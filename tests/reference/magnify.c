@@ -220,7 +220,7 @@ static void set_shown(const struct around *a, const struct face *face, const uin
     const struct ref_ray ray = ref_ray(view, x, y);
     out->cell = c->cell;
     out->id = ref_key_id(cells[c->cell]);
-    if (a->args->pass == PT_RANGE_COARSE && out->marked != REF_YES)
+    if (a->args->pass & PT_RANGE_COARSE && out->marked != REF_YES)
         out->marked = unsharp(a, places + 4 * c->cell, inclined + 4 * c->cell, ray);
     out->z = face->z;
     out->z_error = face->z_error;
@@ -252,12 +252,12 @@ struct ref_magnify ref_magnify(const struct magnify_args *args, const uint64_t *
     out.unsure = fabs(px - round(px)) <= slack || fabs(py - round(py)) <= slack; // of two cells
     offer_faces(&a, 0, &best);
     const double open_face = best.open_z;
-    out.marked = args->pass == PT_RANGE_COARSE && !best.some ? REF_YES : REF_NO;
-    if (!best.some && args->pass != PT_RANGE_FINE)
+    out.marked = args->pass & PT_RANGE_COARSE && !best.some ? REF_YES : REF_NO;
+    if (!best.some && !(args->pass & PT_RANGE_FINE))
         offer_places(&a, &best);
     if (!best.some)
         offer_faces(&a, 1, &best);
-    out.unsure |= args->pass == PT_RANGE_COARSE && isfinite(open_face) && out.marked == REF_YES; // a face or none
+    out.unsure |= args->pass & PT_RANGE_COARSE && isfinite(open_face) && out.marked == REF_YES; // a face or none
     out.shown = best.some;
     out.unsure |= best.some ? best.open_z <= best.face.z + best.face.z_error : isfinite(best.open_z);
     if (best.some)

@@ -433,7 +433,7 @@ static void show(const struct walk *walk, uint32_t x, uint32_t y, uint32_t cy, f
     const vi z = vf_bits(best->z), id = vi_gather_id(PT_DATA(walk->call, magnify, cells), which, best->some);
     // 2. before what is there
     vm some = vm_and(best->some, pt_less(z, id, vi_load_z(keys), vi_load_id(keys)));
-    if (args->pass == PT_RANGE_FINE) {
+    if (args->pass & PT_RANGE_FINE) {
         const vm own = vi_lt_unsigned(vi_sub(vi_load_id(keys), vi_set(args->id_base)), vi_set(args->id_count));
         some = vm_and(vm_or(some, own), replaces(walk, at, best, lanes));
     }
@@ -454,7 +454,7 @@ static void show(const struct walk *walk, uint32_t x, uint32_t y, uint32_t cy, f
     const vf dx = way[0], dy = way[1], square = dx * dx + dy * dy;
     const vm within = vm_and(vm_and(vf_le(minus, dx), vf_lt(dx, half)), vm_and(vf_le(minus, dy), vf_lt(dy, half)));
     vf away = vf_select(within, zero, square * vf_rsqrt(vf_max(square, vf_set(1e-12f))));
-    if (args->pass == PT_RANGE_COARSE)
+    if (args->pass & PT_RANGE_COARSE)
         away = vf_select(unsharp(walk, best, which, ray), vf_set(-1.0f) - away, away);
     const vi own = vi_add(vi_set((uint32_t)at), vi_lanes());
     vi_store_keys(keys, z, id, vm_bits(some));
@@ -492,13 +492,13 @@ static void magnify_row(const struct walk *walk, const struct row *row, uint32_t
         if (vm_bits(vm_and(lanes, best.loose)) && is_near(walk, x, count, cy)) {
             struct corners corners;
             look_around(walk, vi_add(vi_set(x), vi_lanes()), y, lanes, &corners);
-            if (args->pass != PT_RANGE_FINE)
+            if (!(args->pass & PT_RANGE_FINE))
                 take_places(walk, &corners, lanes, &best);
             const vm open = vm_and(lanes, vm_not(best.some));
             for (int k = 0; k < 4 && vm_bits(open); k++)
                 take_loose(walk, &corners, k % 2 + 3 * (k / 2), open, &best);
         }
-        if (vm_bits(best.some) || args->pass == PT_RANGE_FINE)
+        if (vm_bits(best.some) || args->pass & PT_RANGE_FINE)
             show(walk, x, y, cy, up, &best, lanes);
     }
 }
