@@ -439,6 +439,19 @@ static void tell(patina_frame *frame, const patina_scene *scene, uint32_t seed)
     free(text);
 }
 
+// Of frames that are made from here on.
+static void poison_planes(int on)
+{
+#ifdef _WIN32
+    _putenv_s("PATINA_POISON_PLANES", on ? "1" : "");
+#else
+    if (on)
+        setenv("PATINA_POISON_PLANES", "1", 1);
+    else
+        unsetenv("PATINA_POISON_PLANES");
+#endif
+}
+
 static void test_random_scenes(void **state)
 {
     (void)state;
@@ -450,9 +463,9 @@ static void test_random_scenes(void **state)
     if (!devices[0] || !devices[1])
         skip();
     set_up();
-    setenv("PATINA_POISON_PLANES", "1", 1);
+    poison_planes(1);
     patina_frame *used = frame_on(devices[0]);
-    unsetenv("PATINA_POISON_PLANES");
+    poison_planes(0);
     for (uint32_t seed = first; seed < first + count; seed++) {
         struct pcg random = pcg_seed(seed);
         patina_scene *scene = describe(&random);
