@@ -19,7 +19,8 @@ BLOCK = 1 << 19  # points between two looks at what the artist wants
 
 # data_type → property of an element, components
 _LAYOUTS = {'FLOAT': ("value", 1), 'BOOLEAN': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4),
-            'BYTE_COLOR': ("color_srgb", 4), 'INT': ("value", 1), 'INT8': ("value", 1), 'QUATERNION': ("value", 4)}
+            'BYTE_COLOR': ("color_srgb", 4), 'INT': ("value", 1), 'INT8': ("value", 1), 'QUATERNION': ("value", 4),
+            'FLOAT4': ("vector", 4)}  # the last from Blender 5.2 on
 _NUMBERS = {'FLOAT', 'INT', 'INT8', 'BOOLEAN'}
 # data_type → element, components, what Blender shows of one
 _BYTES = {'BYTE_COLOR': (np.uint8, 4, lambda item: np.rint(np.float32(255) * np.array(item.color_srgb, np.float32))),

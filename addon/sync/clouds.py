@@ -602,7 +602,7 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     if splats.are(data):
         discs = splats.read(obj.name, data, count, notices)
         normals = discs.normals if normals is None else normals
-        rgb = discs.colors if rgb is None else rgb
+        rgb = rgb if obj.patina.color_attribute or discs.colors is None else discs.colors
         opacities = discs.opacities if opacities is None else opacities
         radii = radii if obj.patina.radius_attribute or discs.radii is None else discs.radii
     for kind, name, found in (("color", obj.patina.color_attribute, rgb),

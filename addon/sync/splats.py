@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Gaussian splats that Blender holds (a kind of PointCloud from 5.3 on) as discs, as native/io/ply_splats.c makes them of files.
 
-Their numbers are read under the names that files have them by, as logarithms and logits, else as Blender's own: a vector of scales, a
-quaternion, an opacity and a color as they are.
+Blender's importers of PLY, SPZ and USD all write the same attributes (source/blender/io/gsplat): "scale", a vector as it is; "rotation", a
+quaternion, its real part first; "radiance:base", four numbers, the spherical harmonics' constant term and the opacity from 0 to 1;
+"radiance:sh_K", the terms that turn with the view, which discs do not. Where these lack, for somebody's nodes made the splats, the names
+that files have are tried, as logarithms and logits, then others that are usual.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from . import attributes
 
 HARMONIC = 0.28209479177387814  # Y00, sqrt(1 / (4 pi))
 
+RADIANCE = "radiance:base"
 SCALES, TURNS, OPACITIES = ("scale", "scales"), ("rotation", "orientation", "rot"), ("opacity", "alpha")
 BASES = ("f_dc", "sh_dc", "sh_0", "sh0")
 
@@ -35,19 +38,27 @@ def are(data: bpy.types.ID) -> bool:
 
 
 def read(name: str, data: bpy.types.ID, count: int, notices: list[str]) -> Discs:
-    scales = _of_file(data, count, "scale", 3)
-    scales = _own(data, count, SCALES, 3) if scales is None else np.exp(scales)
-    turns = _of_file(data, count, "rot", 4)
-    turns = _own(data, count, TURNS, 4) if turns is None else turns
-    base = _of_file(data, count, "f_dc", 3)
-    base = _own(data, count, BASES, 3) if base is None else base
-    opacities = _own(data, count, OPACITIES, 1)
-    if opacities is not None and "scale_0" in data.attributes:  # as in files: a logit
-        opacities = 1 / (1 + np.exp(-opacities))
+    radiance = _own(data, count, (RADIANCE,), 4)
+    scales = _own(data, count, SCALES, 3)
+    logarithms = _of_file(data, count, "scale", 3) if scales is None else None
+    scales = scales if logarithms is None else np.exp(logarithms)
+    turns = _own(data, count, TURNS, 4)
+    turns = _of_file(data, count, "rot", 4) if turns is None else turns
+    if radiance is not None:
+        base, opacities = radiance[:, :3], radiance[:, 3:]
+    else:
+        base = _of_file(data, count, "f_dc", 3)
+        base = _own(data, count, BASES, 3) if base is None else base
+        opacities = _own(data, count, OPACITIES, 1)
+        if opacities is not None and logarithms is not None:  # as in files: a logit
+            opacities = 1 / (1 + np.exp(-opacities))
     colors = None if base is None else np.clip(np.rint(255 * (0.5 + HARMONIC * base)), 0, 255).astype(np.uint8)
-    missing = [what for what, found in (("size", scales), ("rotation", turns), ("opacity", opacities)) if found is None]
-    notices.append(f"'{name}' holds Gaussian splats: they are drawn as discs of even color" +
-                   (f"; no attribute tells their {' and '.join(missing)}" if missing else ""))
+    missing = [f"{what} ({attribute})" for what, attribute, found in
+               (("size", SCALES[0], scales), ("rotation", TURNS[0], turns), ("color", RADIANCE, base), ("opacity", RADIANCE, opacities))
+               if found is None]
+    shown = "plain points" if scales is None else "discs of even color"
+    notices.append(f"'{name}' holds Gaussian splats: they are drawn as {shown}" +
+                   (f"; no attribute tells their {', '.join(missing)}" if missing else ""))
     return Discs(None if scales is None or turns is None else normals_of(scales, turns), colors,
                  None if opacities is None else opacities.astype(np.float32), None if scales is None else radii_of(scales))
 

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Points as discs: the mode, their radii, what the source pass says of them, and how the panel shows them; Gaussian splats as discs."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 from check_import import import_ply, write_ply
 from check_points import grid, pixel
 from harness import SCRATCH, Skip, add_points, check, check_close, drawn, linear, new_scene, render, reports
 from patina import importers
-from patina.sync import splats
+from patina.sync import attributes, splats
 
 COLOR = (200, 60, 40)
 
@@ -152,29 +154,60 @@ def test_splats_of_blender():
     """A point cloud of the kind that Blender 5.3 has is drawn as discs too; here one that is only called so."""
     honest = splats.are
     raw = [(name, 'FLOAT', values) for name, _, values in splat_columns() if len(name) > 2]
-    own = [("scale", 'FLOAT_VECTOR', np.exp(SIZES)), ("opacity", 'FLOAT', 1 / (1 + np.exp(-LOGITS))), ("rotation", 'QUATERNION', TURNS),
-           ("sh_dc", 'FLOAT_VECTOR', BASE)]
-    for what, found in (("as in files", raw), ("as Blender has them", own)):
-        scene = new_scene(192, 144)
-        scene.patina.surface = 'SPLATS'
-        obj = add_points(PLACES)
-        for name, kind, values in found:
-            key = "vector" if kind == 'FLOAT_VECTOR' else "value"
-            obj.data.attributes.new(name, kind, 'POINT').data.foreach_set(key, np.asarray(values, np.float32).reshape(-1))
-        bpy.context.view_layer.objects.active = obj
-        obj.select_set(True)
-        try:
-            bpy.ops.object.convert(target='POINTCLOUD')
-        except TypeError:
-            raise Skip("this Blender makes no point clouds of meshes") from None
-        reports.clear()
-        try:
-            splats.are = lambda data: isinstance(data, bpy.types.PointCloud)
+    opacities = 1 / (1 + np.exp(-LOGITS))
+    shape = [("scale", 'FLOAT_VECTOR', np.exp(SIZES)), ("rotation", 'QUATERNION', TURNS)]
+    # four numbers: only Blenders from 5.2 on have them as such
+    own = [*shape, ("radiance:base", 'FLOAT_COLOR', np.column_stack([BASE, opacities])), ("radiance:sh_0", 'FLOAT_VECTOR', np.full((3, 3), 9.0))]
+    usual = [*shape, ("opacity", 'FLOAT', opacities), ("sh_dc", 'FLOAT_VECTOR', BASE)]
+    try:
+        splats.are = lambda data: isinstance(data, bpy.types.PointCloud)
+        for what, found in (("as in files", raw), ("as Blender has them", own), ("as is usual", usual)):
+            scene = splats_in_blender(found)
             check_discs(scene, what)
-        finally:
-            splats.are = honest
-        check(any("holds Gaussian splats" in text for _, text in reports), f"notice {reports}")
+            check(any("they are drawn as discs of even color" in text and "no attribute" not in text for _, text in reports), f"notice {reports}")
+        for left_out, told in (("scale", "drawn as plain points; no attribute tells their size (scale)"),
+                               ("rotation", "drawn as discs of even color; no attribute tells their rotation (rotation)"),
+                               ("radiance:base", "no attribute tells their color (radiance:base), opacity (radiance:base)")):
+            scene = splats_in_blender([attribute for attribute in own if attribute[0] != left_out])
+            if left_out == "scale":
+                scene.patina.surface = 'FILL'  # of points as discs their spacing would tell a size
+            covered = len(drawn(render()))
+            check(covered == 3 if left_out == "scale" else covered > 100, f"without {left_out}: pixels {covered}")
+            check(any(told in text for _, text in reports), f"notice {reports}")
+    finally:
+        splats.are = honest
     check(not splats.are(bpy.context.object.data) and bpy.context.object.type == 'POINTCLOUD', "a cloud of points is none of splats")
+
+
+def splats_in_blender(found):
+    """A scene with the three splats as a point cloud of Blender's; found: (name, type, values) of its attributes."""
+    scene = new_scene(192, 144)
+    scene.patina.surface = 'SPLATS'
+    obj = add_points(PLACES)
+    for name, kind, values in found:
+        key = {'FLOAT_VECTOR': "vector", 'FLOAT_COLOR': "color"}.get(kind, "value")
+        obj.data.attributes.new(name, kind, 'POINT').data.foreach_set(key, np.asarray(values, np.float32).reshape(-1))
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    try:
+        bpy.ops.object.convert(target='POINTCLOUD')
+    except TypeError:
+        raise Skip("this Blender makes no point clouds of meshes") from None
+    return scene
+
+
+def test_four_numbers():
+    """An attribute of four numbers a point, as Blender 5.2 brings them, here one that is only shaped so; one value may stand for all points."""
+    class Items(list):
+        def foreach_get(self, key, out):
+            check(key == "vector", f"their property is {key}")
+            out[:] = np.concatenate(self)
+
+    rows = np.arange(12, dtype=np.float32).reshape(3, 4)
+    for kept in (rows, rows[:1]):
+        radiance = SimpleNamespace(domain='POINT', data_type='FLOAT4', data=Items(kept))
+        data = SimpleNamespace(attributes={"radiance:base": radiance})
+        check(np.array_equal(attributes.numbers(data, 3, "radiance:base", 4), np.broadcast_to(kept, (3, 4))), f"{len(kept)} of them")
 
 
 def test_packed_splats():
