@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from statistics import median
 
 STRATA = 6  # of a chunk's points: each holds as many points as all before it
 WHOLE = 0  # strata: all
@@ -69,8 +68,16 @@ class Pace:
         self._beside.append(max(beside, 0.0))
 
     def _seconds(self, level: Level) -> float:
-        return level.seconds(median(self._points), median(self._pixels))
+        return level.seconds(_median(self._points), _median(self._pixels))
 
     def _seconds_for_pictures(self) -> float:
-        beside = median(self._beside or [0.0])
+        beside = _median(self._beside)
         return max(self.budget, LATER * (beside + self._seconds(LEAST))) - beside
+
+
+def _median(values: deque[float]) -> float:
+    """0 of none. Python's statistics would take 8 ms of Blender's start."""
+    ranked, half = sorted(values), len(values) // 2
+    if not ranked:
+        return 0.0
+    return ranked[half] if len(ranked) % 2 else (ranked[half - 1] + ranked[half]) / 2

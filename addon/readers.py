@@ -2,7 +2,8 @@
 """The packages that read LAZ and E57, which are no part of the zip for Blender 3.4 to 4.1: what lacks, and how they come here.
 
 They lie in a folder of their own, one a Python, at the end of where Python looks: nobody else's packages change. Blender's
-Python takes nothing from the user's, and on many systems pip must not touch the system's. Nothing here knows Blender.
+Python takes nothing from the user's, and on many systems pip must not touch the system's. Nothing here knows Blender. What only
+installing needs is imported by it, for Blender's start waits for this module.
 """
 
 from __future__ import annotations
@@ -11,11 +12,7 @@ import contextlib
 import importlib
 import importlib.util
 import os
-import shutil
-import subprocess
 import sys
-import tempfile
-import zipfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
@@ -77,6 +74,7 @@ def look_no_more_in(folder: Path) -> None:
 def install(wheels: Iterable[Path], folder: Path) -> Iterator[str]:
     """Unpacks wheels into the folder, in place of what is there of theirs; says before each what it does. ReadersError, and the
     folder is as it was, when one is none, is for another Python or system, or cannot be written."""
+    import tempfile
     wheels = sorted(wheels)
     for wheel in wheels:
         _check(wheel)
@@ -114,6 +112,7 @@ def _runs_here(system: str) -> bool:
 
 
 def _unpack(wheel: Path, folder: Path) -> None:
+    import zipfile
     try:
         with zipfile.ZipFile(wheel) as archive:
             for entry in archive.infolist():
@@ -126,6 +125,7 @@ def _unpack(wheel: Path, folder: Path) -> None:
 
 
 def _replace(item: Path, place: Path) -> None:
+    import shutil
     if place.is_dir() and not place.is_symlink():
         shutil.rmtree(place)
     else:
@@ -136,6 +136,8 @@ def _replace(item: Path, place: Path) -> None:
 def download(folder: Path, command: list[str] | None = None) -> Iterator[str]:
     """Fetches the wheels into the folder with pip, which installs nothing; says again and again what it does. ReadersError when
     there is no pip, or no way to PyPI. Closing it ends pip."""
+    import subprocess
+    import tempfile
     if command is None:
         if importlib.util.find_spec("pip") is None:
             raise ReadersError(f"this Blender's Python has no pip. {by_hand()}")

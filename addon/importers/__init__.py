@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from ..jobs import Steps
 from ..native import PatinaError
-from . import e57, las, library, pcd
 from .reading import Filter, PointFile, Progress, name_of, told
 
 __all__ = ["FORMATS", "Filter", "PointFile", "Progress", "name_of", "preview", "reader", "steps", "to_mesh", "told"]
@@ -25,20 +25,20 @@ NORMAL_NAME = "Normal"
 WHOLE = np.int8 if bpy.app.version >= (4, 2, 0) else np.int32
 
 
-# ending → module with read(path, filter, progress), steps(path, filter, progress) and preview(path)
-FORMATS = {".ply": library, ".xyz": library, ".txt": library, ".csv": library, ".asc": library, ".pts": library,
-           ".ptx": library, ".las": las, ".laz": las, ".e57": e57, ".pcd": pcd, ".conf": library}
+# ending → module with read(path, filter, progress), steps(path, filter, progress) and preview(path), loaded with its first file
+FORMATS = {".ply": "library", ".xyz": "library", ".txt": "library", ".csv": "library", ".asc": "library", ".pts": "library",
+           ".ptx": "library", ".las": "las", ".laz": "las", ".e57": "e57", ".pcd": "pcd", ".conf": "library"}
 PACKED_SPLATS = {".spz", ".splat", ".ksplat", ".sog"}
 
 
 def reader(path: Path) -> ModuleType:
     """The module for a file's ending; PatinaError names those there are."""
-    module = FORMATS.get(path.suffix.lower())
+    name = FORMATS.get(path.suffix.lower())
     if path.suffix.lower() in PACKED_SPLATS:
         raise PatinaError(f"packed Gaussian splats ({path.suffix}) are not read: convert them to a PLY, as SuperSplat exports it", -5)
-    if module is None:
+    if name is None:
         raise PatinaError(f"'{path.suffix}' is none of {' '.join(FORMATS)}", -5)
-    return module
+    return import_module(f"{__name__}.{name}")
 
 
 def steps(path: Path, wanted: Filter, progress: Progress) -> Steps[PointFile]:

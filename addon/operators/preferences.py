@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -66,6 +65,7 @@ class PATINA_OT_install_readers(_Installing, Operator):
         return self.execute(context)
 
     def _wheels(self) -> Iterator[str]:
+        import tempfile
         with tempfile.TemporaryDirectory(prefix="patina-wheels-") as place:
             yield from readers.download(Path(place), PIP)
             yield from readers.install(Path(place).glob("*.whl"), preferences.readers_folder())

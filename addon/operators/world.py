@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 import bpy
@@ -37,6 +36,7 @@ class PATINA_OT_bake_world(Operator):
         camera = bpy.data.cameras.new("Patina Bake World")
         eye = bpy.data.objects.new("Patina Bake World", camera)
         try:
+            import tempfile
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "world.exr"
                 self._render(scene, eye, world, path)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -35,6 +34,7 @@ def folder() -> Path:
             Path(own).mkdir(parents=True, exist_ok=True)
             if os.access(own, os.W_OK):
                 return Path(own)
+    import tempfile  # which few come to, at Blender's start nobody
     user = getattr(os, "getuid", lambda: "")()
     beside = Path(tempfile.gettempdir()) / f"patina-{user}"
     beside.mkdir(mode=0o700, exist_ok=True)
