@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *patina_version(void) { return PT_VERSION; }
+const char *patina_version(void) { return pt_version; }
 
 static int fail(const char *what) { return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s", what); }
 

@@ -41,7 +41,7 @@ int pt_key_writer_begin(struct pt_key_writer *writer, const struct pt_handle *ha
     struct pt_keys_head *own = &writer->head;
     memcpy(own->magic, magic, sizeof magic);
     own->version = PT_KEYS_VERSION;
-    snprintf(own->engine, sizeof own->engine, "%s", PT_VERSION);
+    snprintf(own->engine, sizeof own->engine, "%s", pt_version);
     own->records = 0;
     own->size = 0;
     own->note_size = note ? strlen(note) : 0;
@@ -149,9 +149,9 @@ static int read_head(struct pt_key_file *file, const struct pt_handle *handle)
     if (head->size != file->disk.size)
         return pt_fail(handle, PATINA_ERROR_FORMAT, "%s: damaged: it has %llu of %llu bytes", file->path,
                        (unsigned long long)file->disk.size, (unsigned long long)head->size);
-    if (strcmp(head->engine, PT_VERSION) != 0)
+    if (strcmp(head->engine, pt_version) != 0)
         return pt_fail(handle, PATINA_ERROR_FORMAT, "%s: written by Patina %s; this is %s: scatter anew", file->path,
-                       head->engine, PT_VERSION);
+                       head->engine, pt_version);
     return head->note_size > PT_KEYS_MOST_NOTE ? refuse(file, handle, "damaged: its note has no end") : PATINA_OK;
 }
 

@@ -185,8 +185,16 @@ def test_passes():
 def test_help_and_version():
     assert "patina render" in run("help").stdout
     assert run("--help").stdout == run("help").stdout
-    assert run("version").stdout.startswith("patina ")
     assert "patina render" in run(code=2).stderr
+
+
+def test_version_is_of_the_sources():
+    """Builds of one day are told apart, and the sources alone say how."""
+    with tempfile.TemporaryDirectory() as folder:
+        stamped = Path(folder) / "version.c"
+        subprocess.run([sys.executable, Path(__file__).resolve().parents[2] / "build/stamp", stamped], check=True)
+        version = re.search(r'pt_version\[\] = "(\d+\.\d+\.\d+\+[0-9a-f]{12})"', stamped.read_text(encoding="utf-8")).group(1)
+    assert run("version").stdout == f"patina {version}\n", version
 
 
 def test_wrong_use_is_told():

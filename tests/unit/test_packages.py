@@ -137,17 +137,19 @@ def validate(path):
     assert done.returncode == 0 and "error" not in (done.stdout + done.stderr).lower(), done.stdout + done.stderr
 
 
-def check_sources(data):
-    """The library's sources are whole: CMake finds each of them, and no kernel lacks its twin."""
+def check_sources(data, library):
+    """The library's sources are whole: CMake finds each of them, no kernel lacks its twin, and they have the library's version."""
     with tempfile.TemporaryDirectory() as scratch, zipfile.ZipFile(io.BytesIO(data)) as archive:
         for entry in archive.infolist():
             mode = entry.external_attr >> 16
             Path(archive.extract(entry, scratch)).chmod(mode)
         root = next(Path(scratch).iterdir())
         for command in (["build/check_twins", "--quiet"], ["cmake", "--preset", "release", "-S", "build"],
-                        ["ninja", "-C", "build/out/release", "-n", "libpatina.so"]):
+                        ["ninja", "-C", "build/out/release", "-n", "libpatina.so"], ["build/stamp", "version.c"]):
             done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
             assert done.returncode == 0, f"{command}: {(done.stdout + done.stderr)[-500:]}"
+        version = re.search(r'"(.*\+.*)"', (root / "version.c").read_text(encoding="utf-8")).group(1)
+        assert version.encode() + b"\0" in library, f"the sources are {version}; the library is not"
 
 
 def check(platform, path):
@@ -169,7 +171,7 @@ def check(platform, path):
             assert listed == {name for name in archive.namelist() if name.startswith("wheels/")}, listed
             assert all(f"## {name.removeprefix('wheels/')}\n" in told for name in listed) and "not said" not in told, told
             if platform == "linux-x64":
-                check_sources(archive.read("docs/sources.zip"))
+                check_sources(archive.read("docs/sources.zip"), data)
         machine, exported, needed = READERS[system](data)
     assert machine == processor, machine
     assert not DECLARED - exported, f"does not export {sorted(DECLARED - exported)}"
