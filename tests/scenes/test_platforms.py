@@ -128,7 +128,7 @@ def main():
             assert len(first) > 3 or "panorama" in options, f"{picture}: no planes were written"
             wrong = [f"{device}: {key}" for device, one in found.items() for key in first.keys() | one.keys() if one.get(key) != first.get(key)]
             passed, failed = passed + (not wrong), failed + bool(wrong)
-            print(f"{'FAILED' if wrong else 'ok'} {picture}", *wrong, sep="\n  " if wrong else " ", flush=True)
+            print(f"{'FAILED' if wrong else 'ok'} {first['out.png']} {picture}", *wrong, sep="\n  " if wrong else " ", flush=True)
     if len(pictures) < len(PICTURES):
         print(f"{len(pictures)} of {len(PICTURES)} pictures: {', '.join(pictures)}")
     print(f"{passed} passed, {failed} failed, 0 skipped")
