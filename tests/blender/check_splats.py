@@ -156,8 +156,8 @@ def test_splats_of_blender():
     raw = [(name, 'FLOAT', values) for name, _, values in splat_columns() if len(name) > 2]
     opacities = 1 / (1 + np.exp(-LOGITS))
     shape = [("scale", 'FLOAT_VECTOR', np.exp(SIZES)), ("rotation", 'QUATERNION', TURNS)]
-    # four numbers: only Blenders from 5.2 on have them as such
-    own = [*shape, ("radiance:base", 'FLOAT_COLOR', np.column_stack([BASE, opacities])), ("radiance:sh_0", 'FLOAT_VECTOR', np.full((3, 3), 9.0))]
+    four = 'FLOAT4' if 'FLOAT4' in bpy.types.Attribute.bl_rna.properties["data_type"].enum_items else 'FLOAT_COLOR'  # from 5.2 on; before
+    own = [*shape, ("radiance:base", four, np.column_stack([BASE, opacities])), ("radiance:sh_0", 'FLOAT_VECTOR', np.full((3, 3), 9.0))]
     usual = [*shape, ("opacity", 'FLOAT', opacities), ("sh_dc", 'FLOAT_VECTOR', BASE)]
     try:
         splats.are = lambda data: isinstance(data, bpy.types.PointCloud)
@@ -185,7 +185,7 @@ def splats_in_blender(found):
     scene.patina.surface = 'SPLATS'
     obj = add_points(PLACES)
     for name, kind, values in found:
-        key = {'FLOAT_VECTOR': "vector", 'FLOAT_COLOR': "color"}.get(kind, "value")
+        key = {'FLOAT_VECTOR': "vector", 'FLOAT4': "vector", 'FLOAT_COLOR': "color"}.get(kind, "value")
         obj.data.attributes.new(name, kind, 'POINT').data.foreach_set(key, np.asarray(values, np.float32).reshape(-1))
     bpy.context.view_layer.objects.active = obj
     obj.select_set(True)
