@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import importlib
 import importlib.util
-import os
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
@@ -106,7 +105,8 @@ def _check(wheel: Path) -> None:
 
 
 def _runs_here(system: str) -> bool:
-    machine = os.uname().machine if hasattr(os, "uname") else "amd64"
+    import platform
+    machine = platform.machine()
     name = {"linux": "linux", "darwin": "macosx", "win32": "win"}.get(sys.platform, sys.platform)
     return name in system and (system.endswith((machine, machine.lower(), "universal2")))
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from unittest import mock
 
 import bpy
 import check_linked  # noqa: F401  no test leaves files with the user
@@ -118,6 +119,16 @@ def test_readers_leave_no_second_name_of_a_script():
         check("__mp_main__" not in sys.modules, "it stays")
         if kept:
             sys.modules["__mp_main__"] = kept
+
+
+def test_readers_of_every_system():
+    """Which wheels a system and its processor take."""
+    for system, machine, fit in (("linux", "x86_64", "manylinux_2_28_x86_64"), ("linux", "aarch64", "manylinux2014_aarch64"),
+                                 ("win32", "AMD64", "win_amd64"), ("win32", "ARM64", "win_arm64"),
+                                 ("darwin", "x86_64", "macosx_10_9_x86_64"), ("darwin", "arm64", "macosx_11_0_arm64")):
+        with mock.patch("sys.platform", system), mock.patch("platform.machine", lambda machine=machine: machine):
+            for other in ("manylinux_2_28_x86_64", "manylinux2014_aarch64", "win_amd64", "win_arm64", "macosx_10_9_x86_64", "macosx_11_0_arm64"):
+                check(readers._runs_here(other) == (other == fit), f"{other} on {system}, {machine}")
 
 
 def test_readers_that_do_not_fit():
