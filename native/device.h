@@ -79,6 +79,9 @@ struct pt_device_ops {
     int (*run_tail)(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count);
     // Waits for all work (so that a clock means something).
     int (*wait)(struct patina_device *device);
+    // Until the next call kernels call look(context) from time to time, from any of their threads; look NULL: no longer. NULL where a
+    // device has copies of what it is given to borrow.
+    void (*watch)(struct patina_device *device, void (*look)(void *context), void *context);
 };
 
 struct patina_device {
@@ -86,6 +89,7 @@ struct patina_device {
     const struct pt_device_ops *ops;
     patina_device_info info;
     uint64_t memory_cap; // bytes of planes a frame may hold; 0: no limit
+    uint64_t mapped_cap; // bytes that a picture holds of clouds in mapped files; 0: as run/pager.h chooses
     // Frames of one device take turns, for its scratch is one. `changed` is told when a turn ends, or a frame is cancelled.
     struct pt_mutex turns;
     struct pt_condition changed;

@@ -60,7 +60,7 @@ class Descriptor(Structure):
 
 class DeviceDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("name", c_char_p), ("threads", c_uint32), ("batch", c_uint32),
-                ("memory_cap", c_uint64)]
+                ("memory_cap", c_uint64), ("mapped_cap", c_uint64)]
 
 
 class DeviceInfo(Descriptor):
@@ -203,7 +203,8 @@ class FrameStats(Descriptor):
                 ("shadow_width", c_uint32), ("shadow_height", c_uint32), ("shadow_pending", c_uint32),
                 ("shadow_samples", c_uint32), ("shadow_error", c_float), ("chunks_clipped", c_uint64),
                 ("chunks_cut", c_uint64), ("pixel_samples", c_uint32), ("pixel_pending", c_uint32),
-                ("pixel_error", c_float)]
+                ("pixel_error", c_float), ("mapped_bytes", c_uint64), ("mapped_cap", c_uint64), ("mapped_held", c_uint64),
+                ("mapped_read", c_uint64), ("mapped_rounds", c_uint32), ("mapped_returned", c_uint32)]
 
 
 class Panorama(Descriptor):

@@ -83,6 +83,7 @@ int patina_device_create(const patina_device_desc *desc, patina_device **out)
     int error = pt_take(NULL, "patina_device_create", desc, &checked, sizeof checked);
     error = error ? error : create_named(&checked, checked.name ? checked.name : "auto", out);
     if (!error) {
+        (*out)->mapped_cap = checked.mapped_cap;
         pt_mutex_init(&(*out)->turns);
         pt_condition_init(&(*out)->changed);
     }
@@ -312,6 +313,8 @@ size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, ch
     if (!frame || !scene || pt_plan_create(scene, &plan))
         return 0;
     pt_plan_share_planes(&plan, pt_passes_together, frame->device, frame->planes.apart); // without memory it stays untold
+    plan.mapped_cap = pt_pager_cap(frame->device, scene, &plan.round_bytes);
+    plan.round_bytes = plan.mapped_cap ? plan.round_bytes : 0;
     size_t length = pt_plan_text(scene, &plan, buffer, size);
     pt_plan_destroy(&plan);
     return length;

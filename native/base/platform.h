@@ -72,8 +72,10 @@ uint32_t pt_core_count(void); // that this process may use, at least 1
 // What vector instructions the processor has and the system keeps; each x86 level has those before it.
 enum pt_vectors { PT_VECTORS_NONE, PT_VECTORS_SSE42, PT_VECTORS_AVX2, PT_VECTORS_AVX512, PT_VECTORS_NEON };
 enum pt_vectors pt_processor_vectors(void);
-void pt_processor_name(char *text, size_t size);                 // as its maker calls it; "processor" where that is not known
-uint64_t pt_peak_memory(void);                                   // most bytes that this process ever held; 0: not known
+void pt_processor_name(char *text, size_t size); // as its maker calls it; "processor" where that is not known
+uint64_t pt_peak_memory(void);                   // most bytes that this process ever held; 0: not known
+uint64_t pt_free_memory(void);                   // bytes that programs may yet take; 0: not known
+uint64_t pt_file_memory(void); // bytes of mapped files that this process holds at the moment, or of all; 0: not known
 const char *pt_error_text(int error, char *buffer, size_t size); // buffer: where the text may lie
 
 // ---- memory ------------------------------------------------------------------------------------------------------------
@@ -82,6 +84,10 @@ const char *pt_error_text(int error, char *buffer, size_t size); // buffer: wher
 // Zeroed, page-aligned. NULL when memory lacks. size 0 gives a valid pointer.
 void *pt_pages_alloc(size_t size);
 void pt_pages_free(void *pages, size_t size); // of pt_pages_alloc or pt_disk_map, NULL is fine; size as asked for
+// Of pt_disk_map, never written. What is returned is held no longer, and comes again from the file when it is read (macOS: it goes
+// first when memory lacks); others may read it meanwhile. What is expected is read soon: the disk may begin. Any part of a mapping.
+void pt_pages_return(void *pages, size_t size);
+void pt_pages_expect(void *pages, size_t size);
 
 // ---- files -------------------------------------------------------------------------------------------------------------
 

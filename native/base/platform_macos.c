@@ -2,6 +2,7 @@
 // Of platform.h, what is macOS's own (11 and later).
 #include "platform.h"
 
+#include <mach/mach.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/sysctl.h>
@@ -23,6 +24,24 @@ uint64_t pt_peak_memory(void)
 {
     struct rusage usage;
     return getrusage(RUSAGE_SELF, &usage) ? 0 : (uint64_t)usage.ru_maxrss; // bytes; kibibytes elsewhere
+}
+
+uint64_t pt_free_memory(void)
+{
+    vm_statistics64_data_t pages;
+    mach_msg_type_number_t count = HOST_VM_INFO64_COUNT;
+    if (host_statistics64(mach_host_self(), HOST_VM_INFO64, (host_info64_t)&pages, &count) != KERN_SUCCESS)
+        return 0;
+    return ((uint64_t)pages.free_count + pages.inactive_count) * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+uint64_t pt_file_memory(void)
+{
+    task_vm_info_data_t about;
+    mach_msg_type_number_t count = TASK_VM_INFO_COUNT;
+    if (task_info(mach_task_self(), TASK_VM_INFO, (task_info_t)&about, &count) != KERN_SUCCESS)
+        return 0;
+    return about.external; // bytes of pages that files lie behind
 }
 
 const char *pt_error_text(int error, char *buffer, size_t size)

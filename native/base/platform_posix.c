@@ -170,6 +170,17 @@ void pt_pages_free(void *pages, size_t size)
         munmap(pages, whole_pages(size));
 }
 
+// Whole pages around what is meant.
+static void advise(void *pages, size_t size, int advice)
+{
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE), before = (uintptr_t)pages % page;
+    if (size)
+        madvise((char *)pages - before, whole_pages(before + size), advice);
+}
+
+void pt_pages_return(void *pages, size_t size) { advise(pages, size, MADV_DONTNEED); }
+void pt_pages_expect(void *pages, size_t size) { advise(pages, size, MADV_WILLNEED); }
+
 // ---- files -------------------------------------------------------------------------------------------------------------
 
 int pt_disk_open(const char *path, struct pt_disk *disk)

@@ -174,6 +174,18 @@ uint64_t pt_peak_memory(void)
     return K32GetProcessMemoryInfo(GetCurrentProcess(), &counters, sizeof counters) ? counters.PeakWorkingSetSize : 0;
 }
 
+uint64_t pt_free_memory(void)
+{
+    MEMORYSTATUSEX about = {.dwLength = sizeof about};
+    return GlobalMemoryStatusEx(&about) ? about.ullAvailPhys : 0;
+}
+
+uint64_t pt_file_memory(void) // all that the process holds: Windows does not tell files apart
+{
+    PROCESS_MEMORY_COUNTERS counters = {.cb = sizeof counters};
+    return K32GetProcessMemoryInfo(GetCurrentProcess(), &counters, sizeof counters) ? counters.WorkingSetSize : 0;
+}
+
 // ---- memory ------------------------------------------------------------------------------------------------------------
 
 void *pt_pages_alloc(size_t size)
@@ -191,6 +203,20 @@ void pt_pages_free(void *pages, size_t size)
         UnmapViewOfFile(pages);
     else
         VirtualFree(pages, 0, MEM_RELEASE);
+}
+
+// Unlocking pages that nobody locked takes them out of the working set.
+void pt_pages_return(void *pages, size_t size)
+{
+    if (size)
+        VirtualUnlock(pages, size);
+}
+
+void pt_pages_expect(void *pages, size_t size)
+{
+    WIN32_MEMORY_RANGE_ENTRY range = {pages, size};
+    if (size)
+        PrefetchVirtualMemory(GetCurrentProcess(), 1, &range, 0);
 }
 
 // ---- paths -------------------------------------------------------------------------------------------------------------

@@ -26,6 +26,7 @@ struct job {
     void *context;
     uint32_t grain, ranges;
     struct range *range;
+    struct pt_pool *pool;
 };
 
 struct pt_pool {
@@ -39,6 +40,8 @@ struct pt_pool {
     uint32_t spins;
     uint32_t threads, batch;
     int quit;
+    void (*look)(void *context); // NULL: nobody watches
+    void *watched;
     struct pt_thread helpers[MAX_THREADS];
     uint32_t started;
 };
@@ -90,8 +93,10 @@ static void take_part(struct job *job, uint32_t thread)
 {
     uint32_t begin, end;
     do {
-        while (take(job, thread, &begin, &end))
+        while (take(job, thread, &begin, &end)) {
             job->work(job->context, begin, end, thread);
+            pt_pool_look(job->pool);
+        }
     } while (steal(job, thread));
 }
 
@@ -184,13 +189,25 @@ void pt_pool_destroy(struct pt_pool *pool)
     free(pool);
 }
 
+void pt_pool_watch(struct pt_pool *pool, void (*look)(void *context), void *context)
+{
+    pool->watched = context;
+    pool->look = look;
+}
+
+void pt_pool_look(struct pt_pool *pool)
+{
+    if (pool && pool->look)
+        pool->look(pool->watched);
+}
+
 uint32_t pt_pool_threads(const struct pt_pool *pool) { return pool ? pool->threads : 1; }
 
 void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *work, void *context)
 {
     if (!items)
         return;
-    if (!pool || pool->threads == 1) {
+    if (!pool || (pool->threads == 1 && !pool->look)) {
         work(context, 0, items, 0);
         return;
     }
@@ -199,7 +216,7 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
     if (!grain)
         grain = items / (4 * pool->threads);
     grain = grain < 1 ? 1 : grain;
-    struct job job = {work, context, grain, pool->threads, pool->ranges};
+    struct job job = {work, context, grain, pool->threads, pool->ranges, pool};
     pt_mutex_lock(&pool->caller);
     for (uint32_t t = 0; t < pool->threads; t++)
         atomic_store_explicit(

@@ -20,6 +20,11 @@ static inline uint32_t pt_pool_threads_for(uint32_t threads, uint64_t points)
 void pt_pool_destroy(struct pt_pool *pool);
 uint32_t pt_pool_threads(const struct pt_pool *pool); // the caller counts as one
 
+// After each share of the work, and where the work says so, threads call look(context), several at once; NULL: nothing. While no work
+// runs.
+void pt_pool_watch(struct pt_pool *pool, void (*look)(void *context), void *context);
+void pt_pool_look(struct pt_pool *pool); // for work that takes long; pool NULL is fine
+
 // Calls work(context, begin, end, thread) until [0, items) is covered; thread < pt_pool_threads. Blocks. The calling
 // thread takes part. grain: items a worker takes at once when the pool's batch is automatic (0 = items / (4 threads)).
 // pool NULL: all in the calling thread.

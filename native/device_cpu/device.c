@@ -148,6 +148,11 @@ static int cpu_wait(struct patina_device *device)
     return PATINA_OK;
 }
 
+static void cpu_watch(struct patina_device *device, void (*look)(void *context), void *context)
+{
+    pt_pool_watch(((struct cpu_device *)device)->pool, look, context);
+}
+
 static void cpu_destroy(struct patina_device *device)
 {
     struct cpu_device *cpu = (struct cpu_device *)device;
@@ -168,6 +173,7 @@ static const struct pt_device_ops cpu_ops = {
     .run = cpu_run,
     .run_tail = cpu_run_tail,
     .wait = cpu_wait,
+    .watch = cpu_watch,
 };
 
 int pt_device_cpu_create(const patina_device_desc *desc, const char *level, struct patina_device **out)

@@ -322,6 +322,8 @@ struct pt_plan {
     uint32_t reopens;  // how often points are drawn where closed pixels are taken back: 2; 0: none are
     uint32_t
         assessed; // of PATINA_PASS_CERTAINTY, _THICKNESS, _DENSITY, _DISAGREEMENT, bits 1 << those that are asked for and known of something
+    uint64_t mapped_cap,
+        round_bytes; // of what is held of clouds in files, and read of them at a time (rounds.h); 0: all there is
     struct pt_arena *arena;
 };
 

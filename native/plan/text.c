@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a plan says of itself: its planes' sizes, which of them readers see, and all of it in words.
 #include "passes.h"
+#include "rounds.h"
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane)
 {
@@ -56,10 +58,24 @@ __attribute__((format(printf, 3, 4))) static void put_line(struct text *text, ui
     text->length += (size_t)snprintf(left ? text->to + text->length : NULL, left, "%*s%s\n", (int)(2 * depth), "", line);
 }
 
+// ", in 3 rounds of 2.1 MB": of a pass that reads more of mapped files than a round may.
+static const char *rounds_of(const struct pt_plan *plan, const struct pt_pass *pass, char *buffer, size_t size)
+{
+    struct pt_chunk_list *lists = plan->round_bytes && pt_pass_divides(pass) ? calloc(pass->ref_count + 1u, sizeof *lists)
+                                                                             : NULL;
+    uint64_t bytes = 0;
+    uint32_t rounds = lists ? pt_count_ranges(lists, pt_pass_lists(plan, pass, lists), plan->round_bytes, &bytes) : 0;
+    free(lists);
+    snprintf(buffer, size, ", in %u rounds for %.1f MB", rounds, 1e-6 * (double)bytes);
+    return rounds > 1 ? buffer : "";
+}
+
 static void put_passes(struct text *text, const struct pt_plan *plan, uint32_t first, uint32_t count, uint32_t depth)
 {
+    char rounds[64];
     for (uint32_t i = first; i < first + count; i++)
-        put_line(text, depth, "run  %-10s %s", pt_kernels[plan->passes[i].kernel].name, plan->passes[i].reason);
+        put_line(text, depth, "run  %-10s %s%s", pt_kernels[plan->passes[i].kernel].name, plan->passes[i].reason,
+                 rounds_of(plan, &plan->passes[i], rounds, sizeof rounds));
 }
 
 // "at most 5, until a layer is empty: reason"
@@ -92,6 +108,7 @@ static void put_map(struct text *text, const struct patina_scene *scene, const s
         if (!pt_plan_tested(scene, plan, &round, step->group) || pt_plan_map(scene, plan, &round, &map))
             return; // without memory it stays untold
         if ((some = map.step_count > 0)) {
+            map.round_bytes = plan->round_bytes;
             put_line(text, depth + 1, "planes %u x %u, %u coarse levels, %llu points, %llu triangles", map.view.width,
                      map.view.height, map.levels, (unsigned long long)map.points_scattered, (unsigned long long)map.triangles);
             put_steps(text, scene, &map, map.steps, map.steps + map.step_count, depth + 1);
@@ -167,6 +184,9 @@ size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char
     if (plan->chunks_clipped || plan->chunks_cut)
         put_line(&text, 0, "chunks clipped %llu, cut %llu", (unsigned long long)plan->chunks_clipped,
                  (unsigned long long)plan->chunks_cut);
+    if (plan->mapped_cap)
+        put_line(&text, 0, "rounds of at most %.1f MB: clouds in files are larger than the %.1f MB that may be held of them",
+                 1e-6 * (double)plan->round_bytes, 1e-6 * (double)plan->mapped_cap);
     if (plan->peak)
         put_memory(&text, plan);
     put_steps(&text, scene, plan, plan->steps, plan->steps + plan->step_count, 0);

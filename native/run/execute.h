@@ -7,6 +7,7 @@
 #include "binder.h"
 #include "layers.h"
 #include "merge.h"
+#include "pager.h"
 #include "times.h"
 
 struct pt_execution {
@@ -15,6 +16,7 @@ struct pt_execution {
     struct pt_plan *plan; // the places of its lights' maps are found once a light's turn comes
     struct pt_binder binder;
     struct pt_merge *merge; // NULL: points are scattered here
+    struct pt_pager *pager; // of the picture, and of the maps that serve it
     struct pt_times *times;
     const atomic_int *cancel;
     _Atomic float *progress;             // NULL: nobody looks

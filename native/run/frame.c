@@ -46,6 +46,7 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     frame->times.count = 0;
     frame->shadow_maps = frame->shadow_size[0] = frame->shadow_size[1] = 0;
     frame->sampling[0] = frame->sampling[1] = 1;
+    frame->pager = (struct pt_pager){0};
     pt_mean_destroy(frame);
     int error = scene->settings.pixel_samples > 1 ? pt_frame_sample(frame, scene) : pt_frame_draw(frame, scene);
     if (!error)

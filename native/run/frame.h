@@ -4,6 +4,7 @@
 
 #include "layers.h"
 #include "numbering.h"
+#include "pager.h"
 #include "residency.h"
 #include "shadows.h"
 #include "times.h"
@@ -42,6 +43,7 @@ struct patina_frame {
     uint32_t sampling[2];                // of the last picture: grid and shifts of its samples
     struct pt_mean *mean;                // while samples of the last picture are pending
     struct pt_merge *merge;              // while parts are merged; NULL: points are scattered here
+    struct pt_pager pager;               // of this render
     struct pt_times times;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;

@@ -43,6 +43,12 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     shown->stats.shadow_maps = frame->shadow_maps;
     shown->stats.shadow_width = frame->shadow_size[0];
     shown->stats.shadow_height = frame->shadow_size[1];
+    shown->stats.mapped_bytes = frame->pager.mapped;
+    shown->stats.mapped_cap = frame->pager.cap;
+    shown->stats.mapped_held = atomic_load(&frame->pager.held);
+    shown->stats.mapped_read = frame->pager.read;
+    shown->stats.mapped_rounds = frame->pager.rounds;
+    shown->stats.mapped_returned = atomic_load(&frame->pager.returned);
     for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
         shown->stats.shadow_bytes += frame->shadows.words[i].size;
     frame->light_count = plan->light_count;
@@ -81,6 +87,7 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
                                      .scene = scene,
                                      .plan = plan,
                                      .merge = frame->merge,
+                                     .pager = &frame->pager,
                                      .times = &frame->times,
                                      .cancel = &frame->cancel,
                                      .progress = &frame->progress,
@@ -99,8 +106,10 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
     link_planes(frame);
     frame->layers[0] = (struct pt_layer){.points = plan->points_scattered};
     int error = pt_shadows_open(frame->device, &frame->shadows, scene, plan);
-    if (!error)
+    if (!error && !(error = pt_pager_open(&frame->pager, frame->device, scene))) {
         error = pt_execute(&execution);
+        pt_pager_close(&frame->pager);
+    }
     pt_execution_close(&execution);
     if (error)
         frame->shown.picture_valid &= !execution.writing; // half a picture is none: the device failed

@@ -114,6 +114,7 @@ static struct pt_execution execution_of(struct part_job *job, struct pt_plan *pl
     return (struct pt_execution){.device = frame->device,
                                  .scene = job->scene,
                                  .plan = plan,
+                                 .pager = &frame->pager,
                                  .times = &frame->times,
                                  .cancel = &frame->cancel,
                                  .binder = {.device = frame->device,
@@ -196,6 +197,7 @@ int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scen
     struct part_job job = {.frame = frame, .scene = scene, .part = part, .planes = {.varies = 1}};
     struct pt_keys_head head;
     frame->times.count = 0;
+    frame->pager = (struct pt_pager){0};
     int error = pt_plan_create(scene, &job.plan);
     if (error)
         return pt_fail_again(&frame->handle, error);
@@ -203,7 +205,11 @@ int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scen
     if (!error)
         error = pt_key_writer_begin(&job.writer, &frame->handle, path, &head, part->note);
     if (!error) {
-        error = draw(&job, head.round);
+        error = pt_pager_open(&frame->pager, frame->device, scene);
+        if (!error) {
+            error = draw(&job, head.round);
+            pt_pager_close(&frame->pager);
+        }
         error = pt_key_writer_end(&job.writer, error);
     }
     pt_key_file_close(&job.before);

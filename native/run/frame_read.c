@@ -172,7 +172,10 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
         frame->sampling[1], (unsigned long long)frame->shown.peak, (unsigned long long)frame->shown.stats.plane_bytes);
     if (frame->shown.soft_parts)
         PUT(",\"soft\":{\"parts\":%u,\"records\":%u}", frame->shown.soft_parts, frame->shown.soft_records);
-    PUT("}}");
+    PUT("},\"mapped\":{\"bytes\":%llu,\"cap\":%llu,\"held\":%llu,\"read\":%llu,\"rounds\":%u,\"returned\":%u}}",
+        (unsigned long long)frame->shown.stats.mapped_bytes, (unsigned long long)frame->shown.stats.mapped_cap,
+        (unsigned long long)frame->shown.stats.mapped_held, (unsigned long long)frame->shown.stats.mapped_read,
+        frame->shown.stats.mapped_rounds, frame->shown.stats.mapped_returned);
 #undef PUT
     return length;
 }

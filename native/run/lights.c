@@ -20,6 +20,7 @@ static int run_plan(struct pt_execution *e, struct pt_plan *plan)
                                  .scene = e->scene,
                                  .plan = plan,
                                  .merge = e->merge,
+                                 .pager = e->pager,
                                  .round = e->round,
                                  .times = e->times,
                                  .cancel = e->cancel,

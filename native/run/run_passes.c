@@ -26,6 +26,21 @@ static int arguments_of(struct pt_execution *e, uint32_t i, const void **out)
     return PATINA_OK;
 }
 
+struct call { // of a pass whose buffers are bound
+    struct pt_execution *execution;
+    const struct pt_pass *pass;
+    const void *arguments;
+};
+
+// The picture is written last and at one go: a cancelled frame leaves the one before it.
+static int run_bound(void *context, struct pt_buffer *const *buffers)
+{
+    const struct call *call = context;
+    struct pt_execution *e = call->execution;
+    return e->device->ops->run(e->device, call->pass->kernel, call->arguments, call->pass->argument_size, buffers,
+                               call->pass->ref_count, is_output(call->pass) ? NULL : e->cancel);
+}
+
 static int run_pass(struct pt_execution *e, uint32_t i)
 {
     const struct pt_pass *pass = &e->plan->passes[i];
@@ -41,10 +56,10 @@ static int run_pass(struct pt_execution *e, uint32_t i)
                       : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t k = 0; k < pass->ref_count && !error; k++)
         error = pt_bind(&e->binder, &pass->refs[k], &bound[k]);
-    // the picture is written last and at one go: a cancelled frame leaves the one before it
-    if (!error)
-        error = e->device->ops->run(e->device, pass->kernel, arguments, pass->argument_size, bound, pass->ref_count,
-                                    is_output(pass) ? NULL : e->cancel);
+    if (!error) {
+        struct call call = {e, pass, arguments};
+        error = pt_pager_run(e->pager, e->plan, pass, bound, run_bound, &call);
+    }
     if (bound != few)
         free(bound);
     return error;

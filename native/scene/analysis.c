@@ -485,6 +485,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->sights = analysis->sights;
     cloud->surface = analysis->surface;
     cloud->shapes = analysis->shapes;
+    cloud->mapped &= ~(1u << PT_ARRAY_SURFACE | 1u << PT_ARRAY_SHAPES);
     cloud->beside = pt_shapes_beside(cloud->shapes, cloud->slots);
     cloud->chunks = analysis->chunks;
     cloud->spacing_base = analysis->spacing_base;

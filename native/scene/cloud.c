@@ -723,6 +723,7 @@ static int replace_colors(struct build *build)
         cloud->info.invalid_colors += build->tallies[c].invalid_colors;
     cloud->info.bytes += (cloud->colors ? color_bytes(cloud) : 0) - (old ? old_bytes : 0);
     cloud->info.has_colors = cloud->color_format != PT_COLOR_NONE;
+    cloud->mapped &= ~(1u << PT_ARRAY_COLORS);
     atomic_fetch_add(&cloud->alive->colors, 1);
     pt_pages_free(old, old_bytes);
     return PATINA_OK;

@@ -42,12 +42,30 @@ static inline size_t pt_color_size(enum pt_color_format format) // bytes a point
     return format == PT_COLOR_SRGB8 ? 3 : format == PT_COLOR_FLOAT ? 12 : 0;
 }
 
+// Arrays of a built cloud, in the order in which a file has them (cloud_store.c).
+enum pt_array {
+    PT_ARRAY_CHUNKS,
+    PT_ARRAY_POSITIONS,
+    PT_ARRAY_ORDER,
+    PT_ARRAY_SURFACE,
+    PT_ARRAY_COLORS,
+    PT_ARRAY_OPACITIES,
+    PT_ARRAY_RADII,
+    PT_ARRAY_SCALARS,
+    PT_ARRAY_CLASSES,
+    PT_ARRAY_SHAPES,
+    PT_ARRAY_SIGHTS,
+    PT_ARRAY_SIGHT_WORDS,
+    PT_ARRAYS
+};
+
 struct patina_cloud {
     struct pt_handle handle;
     patina_cloud_info info;
     struct pt_alive *alive;
     uint64_t slots; // padded points
     uint32_t chunk_count;
+    uint32_t mapped; // bits 1 << pt_array: of points, pages of a file that nobody ever wrote to
     struct pt_chunk *chunks;
     float *positions;   // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
     uint32_t *order;    // slots: index in the caller's arrays
@@ -91,6 +109,19 @@ int pt_check_values(patina_array *scalar, patina_array *classes);
 int pt_cloud_take_values(struct patina_cloud *cloud, const patina_cloud_desc *desc);
 size_t pt_scalar_bytes(const struct patina_cloud *cloud);
 size_t pt_class_bytes(const struct patina_cloud *cloud);
+
+// cloud_pages.c: what of a cloud lies in a mapped file.
+struct pt_section {
+    void **data;
+    uint64_t size; // bytes
+};
+void pt_cloud_sections(struct patina_cloud *cloud, struct pt_section sections[PT_ARRAYS]);
+uint64_t pt_cloud_mapped_bytes(const struct patina_cloud *cloud);
+uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array); // of a point in the file; 0: not mapped
+// No page of the file is held any longer than until it is read again; any thread, whoever reads.
+void pt_cloud_return(const struct patina_cloud *cloud);
+// Points of these slots are read soon: of arrays, bits 1 << pt_array.
+void pt_cloud_expect(const struct patina_cloud *cloud, uint32_t arrays, uint64_t first, uint64_t end);
 
 // Of positions, normals, spacings and opacities, whatever order they came in; never 0. Made at the first call, which reads
 // them all: only shadows ask. Any thread.

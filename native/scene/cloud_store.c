@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SECTION = 1 << 16, VERSION = 9, SECTIONS = 12, PIECE = 1 << 22 };
+enum { SECTION = 1 << 16, VERSION = 9, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
 static const char magic[8] = {'p', 'a', 't', 'i', 'n', 'a', '\n', '\x1a'};
 
 struct header {
@@ -28,11 +28,6 @@ struct header {
     uint64_t check;          // of all before it, and of the chunks
 };
 
-struct section {
-    void **data;
-    uint64_t size;
-};
-
 static uint64_t check_of(const struct header *header, const struct pt_chunk *chunks)
 {
     uint64_t hash = pt_fingerprint(VERSION, header, offsetof(struct header, check));
@@ -42,7 +37,7 @@ static uint64_t check_of(const struct header *header, const struct pt_chunk *chu
 // Piece by piece, so that a file need not be in memory whole to be compared.
 static uint64_t add_piece(uint64_t sum, const void *data, size_t size) { return pt_fingerprint(sum, data, size); }
 
-static uint64_t sum_of(const struct section *section)
+static uint64_t sum_of(const struct pt_section *section)
 {
     uint64_t sum = VERSION;
     for (uint64_t at = 0; at < section->size; at += PIECE)
@@ -52,27 +47,7 @@ static uint64_t sum_of(const struct section *section)
 
 static uint64_t round_section(uint64_t size) { return (size + SECTION - 1) / SECTION * SECTION; }
 
-static void list_sections(struct patina_cloud *cloud, struct section sections[SECTIONS])
-{
-    uint64_t slots = cloud->slots;
-    const struct section list[SECTIONS] = {
-        {(void **)&cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks},
-        {(void **)&cloud->positions, slots * 12},
-        {(void **)&cloud->order, slots * 4},
-        {(void **)&cloud->surface, slots * 4},
-        {&cloud->colors, cloud->color_format ? slots * pt_color_size(cloud->color_format) + 4 : 0},
-        {(void **)&cloud->opacities, cloud->info.has_opacities ? slots + 4 : 0},
-        {(void **)&cloud->radii, cloud->info.has_radii ? slots * 4 : 0},
-        {(void **)&cloud->scalars, cloud->info.has_scalars ? pt_scalar_bytes(cloud) : 0},
-        {(void **)&cloud->classes, cloud->info.has_classes ? pt_class_bytes(cloud) : 0},
-        {(void **)&cloud->shapes, cloud->info.has_shapes ? slots * 4 : 0},
-        {(void **)&cloud->sights.each, cloud->sights.room * sizeof *cloud->sights.each},
-        {(void **)&cloud->sights.words, cloud->sights.bytes},
-    };
-    memcpy(sections, list, sizeof list);
-}
-
-static uint64_t file_size(const struct section sections[SECTIONS])
+static uint64_t file_size(const struct pt_section sections[SECTIONS])
 {
     uint64_t size = SECTION; // the header
     for (int i = 0; i < SECTIONS; i++)
@@ -88,7 +63,7 @@ static int fail_with(const char *path, const char *what, int error)
 
 // ---- save --------------------------------------------------------------------------------------------------------------
 
-static int write_sections(FILE *file, const struct header *header, const struct section sections[SECTIONS])
+static int write_sections(FILE *file, const struct header *header, const struct pt_section sections[SECTIONS])
 {
     int good = fwrite(header, sizeof *header, 1, file) == 1;
     uint64_t at = SECTION;
@@ -104,7 +79,7 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
     if (!cloud || !path)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save: bad arguments");
     struct patina_cloud copy = *cloud;
-    struct section sections[SECTIONS];
+    struct pt_section sections[SECTIONS];
     struct header header = {.version = VERSION,
                             .chunk_size = sizeof(struct pt_chunk),
                             .color_format = cloud->color_format,
@@ -117,7 +92,7 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
                             .sight_room = cloud->sights.room,
                             .sight_bytes = cloud->sights.bytes,
                             .info = cloud->info};
-    list_sections(&copy, sections);
+    pt_cloud_sections(&copy, sections);
     memcpy(header.magic, magic, sizeof magic);
     header.size = file_size(sections);
     for (int i = 0; i < SECTIONS; i++)
@@ -136,6 +111,20 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
 
 static int refuse(const char *path, const char *what) { return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: %s", path, what); }
 
+// Of the caller's numbers. Read by and by: what was looked at is not held.
+static uint32_t greatest_number(const struct patina_cloud *cloud)
+{
+    uint32_t most = 0;
+    for (uint64_t first = 0; first < cloud->slots; first += PIECE) {
+        const uint64_t end = cloud->slots - first < PIECE ? cloud->slots : first + PIECE;
+        pt_cloud_expect(cloud, 1u << PT_ARRAY_ORDER, end, end + PIECE < cloud->slots ? end + PIECE : cloud->slots);
+        for (uint64_t i = first; i < end; i++)
+            most = cloud->order[i] > most ? cloud->order[i] : most;
+        pt_cloud_return(cloud);
+    }
+    return most;
+}
+
 // What is trusted: chunks within the slots, and each slot's point among the caller's.
 static int check_cloud(const char *path, const struct patina_cloud *cloud)
 {
@@ -151,9 +140,7 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
         next += chunk->padded;
         drawn += chunk->count;
     }
-    uint32_t most = 0;
-    for (uint64_t i = 0; i < cloud->slots; i++)
-        most = cloud->order[i] > most ? cloud->order[i] : most;
+    const uint32_t most = greatest_number(cloud);
     if (next != cloud->slots || drawn != cloud->info.drawn || (cloud->slots && most >= cloud->info.count))
         return refuse(path, "its chunks do not hold its points");
     return pt_sights_good(&cloud->sights) ? PATINA_OK : refuse(path, "what its stations saw is damaged");
@@ -180,7 +167,7 @@ static int check_header(const char *path, const struct header *header, uint64_t 
     return PATINA_OK;
 }
 
-static int map_sections(const struct pt_disk *disk, const struct section sections[SECTIONS])
+static int map_sections(const struct pt_disk *disk, const struct pt_section sections[SECTIONS])
 {
     uint64_t at = SECTION;
     for (int i = 0; i < SECTIONS; i++) {
@@ -194,7 +181,7 @@ static int map_sections(const struct pt_disk *disk, const struct section section
 
 // The header, and what it says of the sections; cloud: its fields that the header holds are set.
 static int read_header(const char *path, const struct pt_disk *disk, struct patina_cloud *cloud, struct header *header,
-                       struct section sections[SECTIONS])
+                       struct pt_section sections[SECTIONS])
 {
     size_t got;
     if (pt_disk_read(disk, 0, header, sizeof *header, &got) || got != sizeof *header)
@@ -210,14 +197,14 @@ static int read_header(const char *path, const struct pt_disk *disk, struct pati
     cloud->class_hash = header->class_hash;
     cloud->sights = (struct pt_sights){
         .count = (uint32_t)header->sight_count, .room = (uint32_t)header->sight_room, .bytes = header->sight_bytes};
-    list_sections(cloud, sections);
+    pt_cloud_sections(cloud, sections);
     return file_size(sections) == header->size ? PATINA_OK : refuse(path, "its header is damaged");
 }
 
 static int open_disk(const char *path, const struct pt_disk *disk, struct patina_cloud *cloud)
 {
     struct header header;
-    struct section sections[SECTIONS];
+    struct pt_section sections[SECTIONS];
     int code = read_header(path, disk, cloud, &header, sections);
     if (code)
         return code;
@@ -234,7 +221,10 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
     if (check_of(&header, chunks) != header.check)
         return refuse(path, "its header or chunks are damaged");
     cloud->info.bytes = sections[0].size;
+    for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
+        cloud->mapped |= (uint32_t)(sections[i].size > 0) << i;
     cloud->beside = cloud->shapes && pt_shapes_beside(cloud->shapes, cloud->slots);
+    pt_cloud_return(cloud); // a page in four of shapes was looked at
     return check_cloud(path, cloud);
 }
 
@@ -264,7 +254,7 @@ static int verify_section(const char *path, const struct pt_disk *disk, uint64_t
 static int verify_disk(const char *path, const struct pt_disk *disk, char *buffer, patina_progress *progress)
 {
     struct header header;
-    struct section sections[SECTIONS];
+    struct pt_section sections[SECTIONS];
     struct patina_cloud cloud = {0};
     int code = read_header(path, disk, &cloud, &header, sections);
     uint64_t at = SECTION;

@@ -80,6 +80,7 @@ static int take_scalars(struct patina_cloud *cloud, const patina_array *scalar)
     cloud->info.scalar_range[0] = least <= most ? least : 0.0f;
     cloud->info.scalar_range[1] = least <= most ? most : 0.0f;
     cloud->info.bytes += (values ? size : 0) - (cloud->scalars ? size : 0);
+    cloud->mapped &= ~(1u << PT_ARRAY_SCALARS);
     pt_pages_free(cloud->scalars, size);
     cloud->scalars = values;
     cloud->info.has_scalars = scalar->data != NULL;

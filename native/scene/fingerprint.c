@@ -15,36 +15,68 @@ static uint64_t mix(uint64_t hash, uint64_t word)
     return hash ^ hash >> 29;
 }
 
-uint64_t pt_fingerprint(uint64_t seed, const void *data, size_t size)
+static void begin(uint64_t ways[WAYS], uint64_t seed)
 {
-    uint64_t ways[WAYS] = {seed, seed + 1, seed + 2, seed + 3}, words[WAYS] = {0};
-    const char *at = data;
+    for (uint64_t i = 0; i < WAYS; i++)
+        ways[i] = seed + i;
+}
+
+// All whole words of all ways; returns what is left over.
+static size_t take(uint64_t ways[WAYS], const char *at, size_t size)
+{
+    uint64_t words[WAYS];
     for (; size >= sizeof words; size -= sizeof words, at += sizeof words) {
         memcpy(words, at, sizeof words);
         for (int i = 0; i < WAYS; i++)
             ways[i] = mix(ways[i], words[i]);
     }
-    memset(words, 0, sizeof words);
-    if (size)
-        memcpy(words, at, size);
-    uint64_t hash = mix(seed, size);
+    return size;
+}
+
+static uint64_t end(const uint64_t ways[WAYS], uint64_t seed, size_t left_over, const char *all, size_t size)
+{
+    uint64_t words[WAYS] = {0}, hash = mix(seed, left_over);
+    if (left_over)
+        memcpy(words, all + size - left_over, left_over);
     for (int i = 0; i < WAYS; i++)
         hash = mix(hash, mix(ways[i], words[i]));
     return hash;
 }
 
+uint64_t pt_fingerprint(uint64_t seed, const void *data, size_t size)
+{
+    uint64_t ways[WAYS];
+    begin(ways, seed);
+    return end(ways, seed, take(ways, data, size), data, size);
+}
+
+// The same of an array of the cloud, of which no more than a piece is held where it lies in a file.
+static uint64_t fingerprint_array(uint64_t seed, const struct patina_cloud *cloud, const void *data, size_t size)
+{
+    enum { PIECE = 1 << 24 };
+    uint64_t ways[WAYS];
+    size_t left_over = 0;
+    begin(ways, seed);
+    for (size_t at = 0; at < size; at += PIECE) {
+        left_over = take(ways, (const char *)data + at, size - at < PIECE ? size - at : PIECE);
+        if (cloud->mapped)
+            pt_cloud_return(cloud);
+    }
+    return end(ways, seed, left_over, data, size);
+}
+
 static uint64_t fingerprint_of(const struct patina_cloud *cloud)
 {
-    uint64_t hash = pt_fingerprint(cloud->info.count, cloud->positions, cloud->slots * 12);
-    hash = pt_fingerprint(hash, cloud->surface, cloud->slots * 4);
+    uint64_t hash = fingerprint_array(cloud->info.count, cloud, cloud->positions, cloud->slots * 12);
+    hash = fingerprint_array(hash, cloud, cloud->surface, cloud->slots * 4);
     if (cloud->shapes)
-        hash = pt_fingerprint(hash, cloud->shapes, cloud->slots * 4);
+        hash = fingerprint_array(hash, cloud, cloud->shapes, cloud->slots * 4);
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         hash = pt_fingerprint(hash, chunk->origin, sizeof chunk->origin);
     }
     if (cloud->opacities)
-        hash = pt_fingerprint(hash, cloud->opacities, cloud->slots);
+        hash = fingerprint_array(hash, cloud, cloud->opacities, cloud->slots);
     return hash;
 }
 

@@ -102,6 +102,8 @@ static const char usage_behind[] =
     "                                     numbers by --ramp-colors, over a range that is told\n"
     "  --device auto|cpu|cpu-scalar|cpu-sse42|cpu-avx2|cpu-avx512|cpu-neon|gl-egl|gl-osmesa|gl-wgl\n"
     "  --threads N, --batch N             of the CPU device (0: automatic)\n"
+    "  --memory SIZE                      that a picture holds of .cloud files at a time, as 2G or 500M (default: a third of\n"
+    "                                     what is free); larger ones are read in rounds, to the same picture\n"
     "  --repeat N                         then measure N frames, the camera turning one degree a frame\n"
     "  --stats json                       one JSON object on standard output\n"
     "  --dump-plan                        the passes, and why\n"
@@ -115,7 +117,7 @@ static const char usage_behind[] =
     "patina merge FILE... -o OUT.png      the picture of all its tiles, or of all its parts' keys, with the same bytes\n"
     "  --next NEXT                        of parts whose layers take further rounds: then this is written, and the exit\n"
     "                                     status is 3; scatter all parts --behind NEXT, and merge the keys of all rounds\n"
-    "  --device NAME, --threads N         as of render\n"
+    "  --device NAME, --threads N, --memory SIZE   as of render\n"
     "patina version\n"
     "Exit status: 0 done, 1 failed, 2 wrong use, 3 another round is wanted, 130 cancelled.\n";
 

@@ -43,6 +43,18 @@ static int parse_count(const char *text, uint32_t least, uint32_t most, uint32_t
     return 0;
 }
 
+// Bytes, of at least a megabyte: 500M, 2G, 1.5G.
+static int parse_memory(const char *text, uint64_t *bytes)
+{
+    char *end;
+    const double number = strtod(text, &end);
+    const double unit = !*end || end[1] ? 0.0 : *end == 'M' ? 1e6 : *end == 'G' ? 1e9 : *end == 'T' ? 1e12 : 0.0;
+    if (!(number * unit >= 1e6) || !(number * unit < 1e18))
+        return -1;
+    *bytes = (uint64_t)(number * unit);
+    return 0;
+}
+
 static int parse_size(const char *text, uint32_t *out_width, uint32_t *out_height)
 {
     unsigned width, height;
@@ -234,6 +246,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_count(value, 0, 4096, &o->threads);
     else if (!strcmp(name, "--batch"))
         bad = parse_count(value, 0, UINT32_MAX, &o->batch);
+    else if (!strcmp(name, "--memory"))
+        bad = parse_memory(value, &o->memory);
     else if (!strcmp(name, "--size"))
         bad = parse_size(value, &s->width, &s->height);
     else if (!strcmp(name, "--region"))

@@ -11,8 +11,8 @@
 // How many arguments from `at` on say nothing of what the picture is: where it goes, which part or tile it is, and who draws it.
 static int apart_from_picture(char **at, int left)
 {
-    static const char *const names[] = {"-o",       "--output",  "--part",  "--behind", "--tile",    "--tiles",
-                                        "--device", "--threads", "--batch", "--next",   "--verbose", "--strip"};
+    static const char *const names[] = {"-o",        "--output", "--part", "--behind",  "--tile",  "--tiles", "--device",
+                                        "--threads", "--batch",  "--next", "--verbose", "--strip", "--memory"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (!strcmp(*at, names[i]))
             return strcmp(*at, "--verbose") && left > 1 ? 2 : 1;
@@ -94,7 +94,7 @@ static int parse(int count, char **arguments, struct merge *merge)
             merge->output = value;
         else if (!strcmp(name, "--next"))
             merge->next = value;
-        else if (!strcmp(name, "--device") || !strcmp(name, "--threads")) {
+        else if (!strcmp(name, "--device") || !strcmp(name, "--threads") || !strcmp(name, "--memory")) {
             merge->more[merge->more_count++] = name;
             merge->more[merge->more_count++] = value;
         } else

@@ -54,7 +54,12 @@ static void destroy(struct job *job)
 static int open_device(struct job *job)
 {
     const patina_device_desc desc = {
-        .struct_size = sizeof desc, .name = job->options.device, .threads = job->options.threads, .batch = job->options.batch};
+        .struct_size = sizeof desc,
+        .name = job->options.device,
+        .threads = job->options.threads,
+        .batch = job->options.batch,
+        .mapped_cap = job->options.memory,
+    };
     int code = patina_device_create(&desc, &job->device);
     if (code)
         return tool_failed(job->options.device ? job->options.device : "auto", NULL, code);

@@ -185,6 +185,10 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     }
     printf("}, \"layers\": %u, \"skipped\": %s, \"planes\": %s, \"peak_mb\": %.1f", stats->layers,
            times->skipped ? times->skipped : "{}", times->planes ? times->planes : "{}", (double)pt_peak_memory() / (1 << 20));
+    printf(", \"mapped\": {\"bytes\": %llu, \"cap\": %llu, \"held\": %llu, \"read\": %llu, \"rounds\": %u, \"returned\": %u}",
+           (unsigned long long)stats->mapped_bytes, (unsigned long long)stats->mapped_cap,
+           (unsigned long long)stats->mapped_held, (unsigned long long)stats->mapped_read, stats->mapped_rounds,
+           stats->mapped_returned);
     const patina_expected_error *expected = &stats->expected;
     printf(", \"spacing_px\": %.4f, \"expected_error\": ", (double)stats->spacing_px);
     if (isfinite(expected->color))

@@ -79,6 +79,7 @@ struct tool_options {
     const char *output, *planes, *save_shadows, *load_shadows; // NULL: not asked for
     const char *device;
     uint32_t threads, batch;
+    uint64_t memory; // bytes that a picture holds of .cloud files; 0: automatic
     enum tool_view view;
     double azimuth, elevation, fov;  // degrees; fov 0 = the library's default
     double eye[3], target[3];        // VIEW_LOOK, and the eye of a panorama

@@ -385,6 +385,7 @@ static void average_bands(void *context, uint32_t begin, uint32_t end, uint32_t 
             const struct chunk_view *chunk = &chunks[c];
             if (!may_reach(&average->args->view, chunk, &band))
                 continue;
+            pt_pool_look(average->call->pool);
             for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
                 project(average, &band, chunk, first, chunk->count - first < BLOCK ? chunk->count : first + BLOCK, &blocks);
                 add_few(average, &band, &blocks.narrow, 2);

@@ -222,6 +222,8 @@ static inline void pt_bin_sort(struct pt_bins *bins)
                             ? r[0] * p[0] + r[1] * p[chunk->padded] + r[2] * p[2 * (size_t)chunk->padded] + chunk->hi[2]
                             : 0.0f;
         bins->order[c] = (uint64_t)(z > 0.0f ? pt_bits(z) : 0) << 32 | c;
+        if (c % 16 == 0)
+            pt_pool_look(bins->call->pool);
     }
     qsort(bins->order, count, sizeof *bins->order, pt_bin_farther);
 }

@@ -110,6 +110,7 @@ static void pt_cells_bands(void *context, uint32_t begin, uint32_t end, uint32_t
                                  chunk->count - first < PT_CELL_BLOCK ? chunk->count : first + PT_CELL_BLOCK, &block);
                 cells->add(cells, &band, &block);
             }
+            pt_pool_look(cells->call->pool);
         }
         for (uint32_t y = band.first; y < band.end; y++)
             for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES)

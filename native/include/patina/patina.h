@@ -122,6 +122,10 @@ typedef struct patina_device_desc {
     uint32_t threads;    // CPU worker threads; 0 = one per core available to the process
     uint32_t batch;      // scheduling batch (items a worker takes at once); 0 = automatic. Never changes a picture.
     uint64_t memory_cap; // bytes of planes that a frame may hold (about 100 a pixel, 150 in transparent scenes); 0 = no limit
+    // Bytes that a picture holds at a time of clouds that patina_cloud_open maps. More is read in rounds, and what was read is given
+    // back; no picture changes by it. 0 = a third of the memory that is free when a picture begins; UINT64_MAX = no limit. OpenGL
+    // copies clouds whole: PATINA_ERROR_MEMORY where they take more than a cap that is given.
+    uint64_t mapped_cap;
 } patina_device_desc;
 
 typedef struct patina_device_info {
@@ -748,8 +752,15 @@ typedef struct patina_frame_stats {
     uint64_t chunks_cut;                  // in view, whose points were tested one by one
     uint32_t pixel_samples;               // whose mean every pixel is at least; 1: of the picture without samples
     uint32_t pixel_pending;               // progressive: samples a pixel that patina_frame_refine takes yet, at most
-    float pixel_error; // expected standard error of the mean, shares of white in levels as sRGB's, root mean square over
-                       // the pixels whose samples differ; 0 = not known: fewer than two shifted pictures
+    float pixel_error;     // expected standard error of the mean, shares of white in levels as sRGB's, root mean square over
+                           // the pixels whose samples differ; 0 = not known: fewer than two shifted pictures
+    uint64_t mapped_bytes; // of the scene's clouds in files that patina_cloud_open mapped
+    uint64_t
+        mapped_cap; // what of these was held at most, as planned: device_desc.mapped_cap; 0 = they fit, or OpenGL has copies
+    uint64_t mapped_held;     // and as it was measured
+    uint64_t mapped_read;     // by passes over points, each counted; what pixels ask of single points comes to it
+    uint32_t mapped_rounds;   // of the pass over points that took most; 0 where nothing is mapped
+    uint32_t mapped_returned; // how often all that was held was given back
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "rounds.h"
+
+int pt_pass_divides(const struct pt_pass *pass)
+{
+    switch (pass->kernel) {
+    case PT_KERNEL_scatter: // least keys
+    case PT_KERNEL_sift:    // bits, words and records of the chunks themselves
+    case PT_KERNEL_lit:
+    case PT_KERNEL_dim:
+    case PT_KERNEL_gather: return 1;
+    default: return 0; // sums that end in a mean, or bins that the next pass takes up
+    }
+}
+
+static uint32_t array_bit(enum pt_instance_buffer which, const struct patina_cloud *cloud)
+{
+    switch (which) {
+    case PT_POSITIONS: return 1u << PT_ARRAY_POSITIONS;
+    case PT_SURFACE: return 1u << PT_ARRAY_SURFACE;
+    case PT_COLORS: return 1u << PT_ARRAY_COLORS;
+    case PT_OPACITIES: return 1u << PT_ARRAY_OPACITIES;
+    case PT_RADII: return 1u << (cloud->radii ? PT_ARRAY_RADII : PT_ARRAY_SHAPES);
+    case PT_SCALARS: return 1u << PT_ARRAY_SCALARS;
+    case PT_CLASSES: return 1u << PT_ARRAY_CLASSES;
+    case PT_SHAPES: return 1u << PT_ARRAY_SHAPES;
+    default: return 0;
+    }
+}
+
+uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, struct pt_chunk_list *lists)
+{
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < pass->ref_count; k++) {
+        const struct pt_ref *ref = &pass->refs[k];
+        if (ref->which != PT_CHUNKS || (ref->of != PT_OF_INSTANCE && ref->of != PT_OF_RECEIVER))
+            continue;
+        const int own = ref->of == PT_OF_INSTANCE;
+        const struct patina_cloud *cloud = own ? plan->instances[ref->index].instance->cloud : plan->receivers[ref->index].cloud;
+        if (!cloud) // pixels that show meshes
+            continue;
+        struct pt_chunk_list *list = &lists[count++];
+        *list = (struct pt_chunk_list){
+            .cloud = cloud,
+            .chunks = own ? plan->instances[ref->index].chunks : plan->receivers[ref->index].chunks,
+            .count = own ? plan->instances[ref->index].chunk_count : plan->receivers[ref->index].chunk_count,
+            .ref = k,
+            .culled = pass->kernel == PT_KERNEL_scatter ? 1u << PT_ARRAY_SURFACE : 0};
+        for (uint32_t i = 0; i < pass->ref_count; i++)
+            if (pass->refs[i].of == ref->of && pass->refs[i].index == ref->index)
+                list->arrays |= array_bit((enum pt_instance_buffer)pass->refs[i].which, cloud);
+    }
+    return count;
+}
+
+static uint32_t bytes_of(const struct pt_chunk_list *list, uint32_t arrays)
+{
+    uint32_t bytes = 0;
+    for (int i = 0; i < PT_ARRAYS; i++)
+        bytes += arrays >> i & 1u ? pt_cloud_point_bytes(list->cloud, (enum pt_array)i) : 0;
+    return bytes;
+}
+
+int pt_next_range(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, struct pt_chunk_range *range)
+{
+    uint32_t list = range->end_list, chunk = range->end_chunk, some = 0;
+    *range = (struct pt_chunk_range){.list = list, .chunk = chunk};
+    for (; list < count; list++, chunk = 0) {
+        const struct pt_chunk_list *at = &lists[list];
+        const uint64_t all = bytes_of(at, at->arrays), facing = bytes_of(at, at->arrays & ~at->culled);
+        for (; chunk < at->count; chunk++, some = 1) {
+            const uint64_t bytes = at->chunks[chunk].padded * (at->chunks[chunk].cull ? all : facing);
+            if (some && range->bytes + bytes > most)
+                goto full;
+            range->bytes += bytes;
+        }
+    }
+full:
+    range->end_list = list;
+    range->end_chunk = chunk;
+    return some != 0;
+}
+
+uint32_t pt_count_ranges(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, uint64_t *bytes)
+{
+    struct pt_chunk_range range = {0};
+    uint32_t ranges = 0;
+    for (*bytes = 0; pt_next_range(lists, count, most, &range); ranges++)
+        *bytes += range.bytes;
+    return *bytes ? ranges : 0;
+}

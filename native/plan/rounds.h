@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Rounds: a pass over points on ranges of their chunks, one after another (SPEC 13).
+#ifndef PT_ROUNDS_H
+#define PT_ROUNDS_H
+
+#include "plan.h"
+
+// A list of chunks that a pass walks, in whole or in part, and of which arrays of their cloud.
+struct pt_chunk_list {
+    const struct patina_cloud *cloud;
+    const struct chunk_view *chunks;
+    uint32_t count;
+    uint32_t arrays; // bits 1 << pt_array
+    uint32_t ref;    // of the pass: the chunks'
+    uint32_t culled; // of the arrays those that only chunks with a cone to be tested are read of
+};
+
+// From a chunk of a list up to another: `end` is not of it.
+struct pt_chunk_range {
+    uint32_t list, chunk, end_list, end_chunk;
+    uint64_t bytes; // of files
+};
+
+// Whether the pass comes to the same by ranges of chunks in turn: it takes a minimum, or writes what belongs to its chunks alone.
+int pt_pass_divides(const struct pt_pass *pass);
+// The lists of a pass, all their chunks; lists: room for as many as the pass has references. Returns how many.
+uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, struct pt_chunk_list *lists);
+// The next range, of no more bytes than `most` but of one chunk at least; 0: there is none. *range: the last one, or zero.
+int pt_next_range(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, struct pt_chunk_range *range);
+// In how many of them a pass runs; *bytes: of all. 0 where it reads no file.
+uint32_t pt_count_ranges(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, uint64_t *bytes);
+
+#endif

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pager.h"
+
+#include "base/platform.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    SHARE = 3,        // of the free memory
+    ROUNDS_A_CAP = 2, // the last round's pages and this one's
+    FULL_EIGHTHS = 7, // from here on all is given back: threads read on meanwhile
+    // To look takes 2 to 5 microseconds. Of a file that lies in the system's memory threads take up to 50 GB a second: no more than an
+    // eighth of the cap between two looks, but where it is so small that they would do nothing else.
+    LOOK_LEAST = 20,
+    LOOK_MOST = 500,          // microseconds
+    BYTES_A_LOOK = 8 * 50000, // of the cap, a microsecond
+};
+
+// Clouds that several instances show count once.
+static int is_first(const struct patina_scene *scene, uint32_t i)
+{
+    for (uint32_t k = 0; k < i; k++)
+        if (scene->instances[k].cloud == scene->instances[i].cloud)
+            return 0;
+    return 1;
+}
+
+static uint64_t mapped_bytes(const struct patina_scene *scene)
+{
+    uint64_t bytes = 0;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        bytes += scene->instances[i].cloud->mapped && is_first(scene, i) ? pt_cloud_mapped_bytes(scene->instances[i].cloud) : 0;
+    return bytes;
+}
+
+static uint64_t cap_for(const struct patina_device *device, uint64_t mapped, uint64_t *round)
+{
+    const uint64_t cap = !mapped || !device->ops->watch ? 0 : device->mapped_cap ? device->mapped_cap : pt_free_memory() / SHARE;
+    *round = cap / ROUNDS_A_CAP;
+    return mapped > cap ? cap : 0;
+}
+
+uint64_t pt_pager_cap(const struct patina_device *device, const struct patina_scene *scene, uint64_t *round)
+{
+    return cap_for(device, mapped_bytes(scene), round);
+}
+
+// ---- giving back ---------------------------------------------------------------------------------------------------------
+
+static uint64_t held_now(const struct pt_pager *pager)
+{
+    const uint64_t now = pt_file_memory();
+    return !pager->before ? pager->cap : now > pager->before ? now - pager->before : 0; // where nobody knows, all there may be
+}
+
+static void give_back(struct pt_pager *pager)
+{
+    for (uint32_t i = 0; i < pager->scene->instance_count; i++)
+        if (pager->scene->instances[i].cloud->mapped)
+            pt_cloud_return(pager->scene->instances[i].cloud);
+}
+
+// Gives all back where `more` bytes do not fit beside what is held.
+static void make_room(struct pt_pager *pager, uint64_t more)
+{
+    const uint64_t held = held_now(pager);
+    uint64_t most = atomic_load(&pager->held);
+    while (held > most && !atomic_compare_exchange_weak(&pager->held, &most, held))
+        ;
+    if (!held || held + more <= pager->cap)
+        return;
+    give_back(pager);
+    atomic_fetch_add(&pager->returned, 1);
+}
+
+static uint64_t microseconds(void) { return (uint64_t)(1e3 * pt_milliseconds()); }
+
+// Of the device's threads: one looks, the others go on.
+static void look(void *context)
+{
+    struct pt_pager *pager = context;
+    const uint64_t now = microseconds();
+    uint64_t again = atomic_load_explicit(&pager->again, memory_order_relaxed);
+    if (now >= again && atomic_compare_exchange_strong(&pager->again, &again, now + pager->pause))
+        make_room(pager, pager->cap / 8 * (8 - FULL_EIGHTHS));
+}
+
+int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const struct patina_scene *scene)
+{
+    pager->device = device;
+    pager->scene = scene;
+    pager->mapped = mapped_bytes(scene);
+    pager->cap = cap_for(device, pager->mapped, &pager->round);
+    if (!device->ops->watch && device->mapped_cap && pager->mapped > device->mapped_cap)
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY,
+                       "%s copies clouds whole: theirs are %.1f MB, the cap of what is held of mapped clouds is %.1f MB; the "
+                       "processor draws them in rounds",
+                       device->info.name, 1e-6 * (double)pager->mapped, 1e-6 * (double)device->mapped_cap);
+    if (!pager->cap)
+        return PATINA_OK;
+    give_back(pager);
+    pager->before = pt_file_memory();
+    const uint64_t pause = pager->cap / BYTES_A_LOOK;
+    pager->pause = pause < LOOK_LEAST ? LOOK_LEAST : pause < LOOK_MOST ? pause : LOOK_MOST;
+    atomic_store(&pager->again, 0);
+    device->ops->watch(device, look, pager);
+    return PATINA_OK;
+}
+
+void pt_pager_close(struct pt_pager *pager)
+{
+    if (!pager->cap)
+        return;
+    make_room(pager, 0);
+    pager->device->ops->watch(pager->device, NULL, NULL);
+}
+
+// ---- rounds --------------------------------------------------------------------------------------------------------------
+
+// What a range of lists is of one of them: [first, end).
+static void part_of(const struct pt_chunk_list *lists, const struct pt_chunk_range *range, uint32_t list, uint32_t *first,
+                    uint32_t *end)
+{
+    *first = list == range->list ? range->chunk : 0;
+    *end = list < range->end_list ? lists[list].count : range->end_chunk;
+    if (list < range->list || list > range->end_list)
+        *first = *end = 0;
+}
+
+// The disk may begin with it: chunks that lie beside each other at one go.
+static void expect(const struct pt_chunk_list *lists, uint32_t count, const struct pt_chunk_range *range)
+{
+    for (uint32_t i = range->list; i < count && i <= range->end_list; i++) {
+        uint32_t first, end;
+        part_of(lists, range, i, &first, &end);
+        for (uint32_t c = first; c < end;) {
+            const struct chunk_view *chunk = &lists[i].chunks[c++];
+            uint64_t slots = (uint64_t)chunk->first + chunk->padded;
+            for (; c < end && lists[i].chunks[c].first == slots && lists[i].chunks[c].cull == chunk->cull; c++)
+                slots += lists[i].chunks[c].padded;
+            pt_cloud_expect(lists[i].cloud, lists[i].arrays & ~(chunk->cull ? 0 : lists[i].culled), chunk->first, slots);
+        }
+    }
+}
+
+struct bound {
+    struct pt_chunk_list *lists;
+    struct pt_buffer *parts; // of the lists
+    struct pt_buffer **buffers;
+    uint32_t count;
+};
+
+static int run_range(const struct bound *bound, struct pt_buffer *const *whole, const struct pt_chunk_range *range,
+                     pt_run_bound *run, void *context)
+{
+    for (uint32_t i = 0; i < bound->count; i++) {
+        const struct pt_chunk_list *list = &bound->lists[i];
+        uint32_t first, end;
+        part_of(bound->lists, range, i, &first, &end);
+        bound->parts[i] = *whole[list->ref];
+        bound->parts[i].data = (char *)bound->parts[i].data + first * sizeof *list->chunks;
+        bound->parts[i].size = (end - first) * sizeof *list->chunks;
+        bound->buffers[list->ref] = &bound->parts[i];
+    }
+    return run(context, bound->buffers);
+}
+
+// One after another; while one is drawn, the disk reads the next.
+static int run_ranges(struct pt_pager *pager, const struct bound *bound, struct pt_buffer *const *whole, pt_run_bound *run,
+                      void *context)
+{
+    struct pt_chunk_range range = {0}, next;
+    int error = PATINA_OK, some = pt_next_range(bound->lists, bound->count, pager->round, &range);
+    expect(bound->lists, bound->count, &range);
+    while (some && !error) {
+        next = range;
+        some = pt_next_range(bound->lists, bound->count, pager->round, &next);
+        if (some)
+            expect(bound->lists, bound->count, &next);
+        make_room(pager, range.bytes);
+        error = run_range(bound, whole, &range, run, context);
+        range = next;
+    }
+    return error;
+}
+
+int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
+                 struct pt_buffer *const *buffers, pt_run_bound *run, void *context)
+{
+    if (!pager || !pager->mapped)
+        return run(context, buffers);
+    struct bound bound = {.lists = calloc(pass->ref_count + 1u, sizeof *bound.lists)};
+    uint64_t bytes = 0;
+    uint32_t ranges = 0;
+    if (bound.lists) {
+        bound.count = pt_pass_lists(plan, pass, bound.lists);
+        for (uint32_t i = 0; i < bound.count; i++) { // of a layer or a part they are not all that was planned
+            struct pt_chunk_list *list = &bound.lists[i];
+            list->chunks = buffers[list->ref]->data ? buffers[list->ref]->data : list->chunks;
+            list->count = (uint32_t)(buffers[list->ref]->size / sizeof *list->chunks);
+        }
+        ranges = pt_count_ranges(bound.lists, bound.count, pager->cap ? pager->round : UINT64_MAX, &bytes);
+        pager->read += bytes;
+        ranges = ranges > 1 && !pt_pass_divides(pass) ? 1 : ranges;
+        pager->rounds = ranges > pager->rounds ? ranges : pager->rounds;
+    }
+    if (ranges > 1) {
+        bound.parts = calloc(bound.count, sizeof *bound.parts);
+        bound.buffers = calloc(pass->ref_count, sizeof *bound.buffers);
+    }
+    int error;
+    if (bound.parts && bound.buffers) {
+        memcpy(bound.buffers, buffers, pass->ref_count * sizeof *bound.buffers);
+        error = run_ranges(pager, &bound, buffers, run, context);
+    } else { // in one, which need not be held whole: whoever runs it looks after that
+        error = run(context, buffers);
+    }
+    free(bound.lists);
+    free(bound.parts);
+    free(bound.buffers);
+    return error;
+}

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a picture holds of clouds whose files are mapped (SPEC 13): no more than a cap. Where they are larger, passes over points run in
+// rounds, and whenever more is held than there should be, all of it is given back.
+#ifndef PT_PAGER_H
+#define PT_PAGER_H
+
+#include "plan/rounds.h"
+
+struct pt_pager {
+    struct patina_device *device;
+    const struct patina_scene *scene;
+    uint64_t cap;           // 0: all of it fits
+    uint64_t round;         // bytes that a round reads at most
+    uint64_t before;        // pt_file_memory with nothing held
+    uint64_t pause;         // microseconds between two looks
+    _Atomic uint64_t again; // when the next is due
+    _Atomic uint64_t held;  // most
+    atomic_uint returned;
+    uint64_t mapped, read;
+    uint32_t rounds;
+};
+
+// Finds the cap: the device's, or of the memory that is free. PATINA_ERROR_MEMORY, with its message at the device, where this copies
+// clouds and they exceed a cap that was given. What was counted goes on.
+int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const struct patina_scene *scene);
+void pt_pager_close(struct pt_pager *pager);
+// The cap that a picture of the scene would have, and how much a round of it reads; 0: all of it fits.
+uint64_t pt_pager_cap(const struct patina_device *device, const struct patina_scene *scene, uint64_t *round);
+
+// Runs a pass whose buffers are bound, in rounds where it takes any. *lists: what the caller bound, where it is not what was planned.
+typedef int pt_run_bound(void *context, struct pt_buffer *const *buffers);
+int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
+                 struct pt_buffer *const *buffers, pt_run_bound *run, void *context);
+
+#endif
