@@ -36,16 +36,17 @@ uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, s
         if (ref->which != PT_CHUNKS || (ref->of != PT_OF_INSTANCE && ref->of != PT_OF_RECEIVER))
             continue;
         const int own = ref->of == PT_OF_INSTANCE;
-        const struct patina_cloud *cloud = own ? plan->instances[ref->index].instance->cloud : plan->receivers[ref->index].cloud;
+        const struct patina_cloud *cloud = own ? plan->instances[ref->index].instance->cloud
+                                               : plan->receivers[ref->index].cloud;
         if (!cloud) // pixels that show meshes
             continue;
         struct pt_chunk_list *list = &lists[count++];
-        *list = (struct pt_chunk_list){
-            .cloud = cloud,
-            .chunks = own ? plan->instances[ref->index].chunks : plan->receivers[ref->index].chunks,
-            .count = own ? plan->instances[ref->index].chunk_count : plan->receivers[ref->index].chunk_count,
-            .ref = k,
-            .culled = pass->kernel == PT_KERNEL_scatter ? 1u << PT_ARRAY_SURFACE : 0};
+        *list = (struct pt_chunk_list){.cloud = cloud,
+                                       .chunks = own ? plan->instances[ref->index].chunks : plan->receivers[ref->index].chunks,
+                                       .count = own ? plan->instances[ref->index].chunk_count
+                                                    : plan->receivers[ref->index].chunk_count,
+                                       .ref = k,
+                                       .culled = pass->kernel == PT_KERNEL_scatter ? 1u << PT_ARRAY_SURFACE : 0};
         for (uint32_t i = 0; i < pass->ref_count; i++)
             if (pass->refs[i].of == ref->of && pass->refs[i].index == ref->index)
                 list->arrays |= array_bit((enum pt_instance_buffer)pass->refs[i].which, cloud);

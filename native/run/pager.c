@@ -36,7 +36,9 @@ static uint64_t mapped_bytes(const struct patina_scene *scene)
 
 static uint64_t cap_for(const struct patina_device *device, uint64_t mapped, uint64_t *round)
 {
-    const uint64_t cap = !mapped || !device->ops->watch ? 0 : device->mapped_cap ? device->mapped_cap : pt_free_memory() / SHARE;
+    const uint64_t cap = !mapped || !device->ops->watch ? 0
+                         : device->mapped_cap           ? device->mapped_cap
+                                                        : pt_free_memory() / SHARE;
     *round = cap / ROUNDS_A_CAP;
     return mapped > cap ? cap : 0;
 }

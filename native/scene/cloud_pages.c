@@ -45,9 +45,9 @@ uint64_t pt_cloud_mapped_bytes(const struct patina_cloud *cloud)
 
 uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array)
 {
-    static const uint8_t bytes[PT_ARRAYS] = {[PT_ARRAY_POSITIONS] = 12, [PT_ARRAY_ORDER] = 4,   [PT_ARRAY_SURFACE] = 4,
-                                             [PT_ARRAY_OPACITIES] = 1,  [PT_ARRAY_RADII] = 4,   [PT_ARRAY_SCALARS] = 4,
-                                             [PT_ARRAY_CLASSES] = 1,    [PT_ARRAY_SHAPES] = 4};
+    static const uint8_t bytes[PT_ARRAYS] = {
+        [PT_ARRAY_POSITIONS] = 12, [PT_ARRAY_ORDER] = 4,   [PT_ARRAY_SURFACE] = 4, [PT_ARRAY_OPACITIES] = 1,
+        [PT_ARRAY_RADII] = 4,      [PT_ARRAY_SCALARS] = 4, [PT_ARRAY_CLASSES] = 1, [PT_ARRAY_SHAPES] = 4};
     if (!(cloud->mapped >> array & 1u))
         return 0;
     return array == PT_ARRAY_COLORS ? (uint32_t)pt_color_size(cloud->color_format) : bytes[array];
