@@ -74,6 +74,12 @@ foreach(folder kernels unit scenes hard)
     endforeach()
 endforeach()
 
+# What the bench draws that is too large to be made in memory.
+add_executable(bench_town EXCLUDE_FROM_ALL ${TESTS}/bench/town.c)
+set_target_properties(bench_town PROPERTIES OUTPUT_NAME town RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests/bench)
+target_link_libraries(bench_town PRIVATE patina_test_support patina_test)
+add_dependencies(all_tests bench_town)
+
 # tests/fuzz/fuzz_NAME.c: libFuzzer targets; without PATINA_FUZZ they only replay a corpus.
 file(GLOB sources CONFIGURE_DEPENDS ${TESTS}/fuzz/fuzz_*.c)
 if(CMAKE_C_COMPILER_ID MATCHES "Clang" AND PATINA_SANITIZE)

@@ -123,6 +123,14 @@ void pt_cloud_return(const struct patina_cloud *cloud);
 // Points of these slots are read soon: of arrays, bits 1 << pt_array.
 void pt_cloud_expect(const struct patina_cloud *cloud, uint32_t arrays, uint64_t first, uint64_t end);
 
+// cloud_store.c: a file of a cloud that need not be in memory at once. begin: of `cloud` the numbers that sizes follow from count, not its
+// arrays; `path` lasts. Then each array in its order, in any pieces, side by side; what fails is told at the end. end: of `cloud` the
+// chunks too. The file takes its place if all went well.
+struct pt_cloud_writer;
+int pt_cloud_writer_begin(const char *path, const struct patina_cloud *cloud, struct pt_cloud_writer **out);
+void pt_cloud_writer_add(struct pt_cloud_writer *writer, enum pt_array array, const void *data, uint64_t size);
+int pt_cloud_writer_end(struct pt_cloud_writer *writer, const struct patina_cloud *cloud);
+
 // Of positions, normals, spacings and opacities, whatever order they came in; never 0. Made at the first call, which reads
 // them all: only shadows ask. Any thread.
 uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);

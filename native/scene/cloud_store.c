@@ -8,6 +8,7 @@
 #include "base/platform.h"
 #include "base/progress.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,14 +38,6 @@ static uint64_t check_of(const struct header *header, const struct pt_chunk *chu
 // Piece by piece, so that a file need not be in memory whole to be compared.
 static uint64_t add_piece(uint64_t sum, const void *data, size_t size) { return pt_fingerprint(sum, data, size); }
 
-static uint64_t sum_of(const struct pt_section *section)
-{
-    uint64_t sum = VERSION;
-    for (uint64_t at = 0; at < section->size; at += PIECE)
-        sum = add_piece(sum, (const char *)*section->data + at, section->size - at < PIECE ? section->size - at : PIECE);
-    return sum;
-}
-
 static uint64_t round_section(uint64_t size) { return (size + SECTION - 1) / SECTION * SECTION; }
 
 static uint64_t file_size(const struct pt_section sections[SECTIONS])
@@ -63,15 +56,110 @@ static int fail_with(const char *path, const char *what, int error)
 
 // ---- save --------------------------------------------------------------------------------------------------------------
 
-static int write_sections(FILE *file, const struct header *header, const struct pt_section sections[SECTIONS])
+// Sections side by side, each piece by piece.
+struct pt_cloud_writer {
+    struct pt_whole whole;
+    const char *path;
+    struct header header;
+    uint64_t at[SECTIONS], left[SECTIONS]; // where the next piece goes; what is to come
+    char *piece[SECTIONS];                 // that fills
+    size_t held[SECTIONS];
+    int good;
+};
+
+static void write_piece(struct pt_cloud_writer *writer, int section, const void *data, size_t size)
 {
-    int good = fwrite(header, sizeof *header, 1, file) == 1;
+    writer->header.sums[section] = add_piece(writer->header.sums[section], data, size);
+    writer->good &= !pt_stream_seek(writer->whole.stream, writer->at[section]) &&
+                    fwrite(data, size, 1, writer->whole.stream) == 1;
+    writer->at[section] += size;
+}
+
+int pt_cloud_writer_begin(const char *path, const struct patina_cloud *cloud, struct pt_cloud_writer **out)
+{
+    struct patina_cloud copy = *cloud;
+    struct pt_section sections[SECTIONS];
+    struct pt_cloud_writer *writer = *out = calloc(1, sizeof *writer);
+    if (!writer)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    pt_cloud_sections(&copy, sections);
     uint64_t at = SECTION;
-    for (int i = 0; i < SECTIONS && good; i++) {
-        good = !pt_stream_seek(file, at) && (!sections[i].size || fwrite(*sections[i].data, sections[i].size, 1, file) == 1);
+    for (int i = 0; i < SECTIONS; i++) {
+        writer->at[i] = at;
+        writer->left[i] = sections[i].size;
+        writer->header.sums[i] = VERSION;
         at += round_section(sections[i].size);
     }
-    return good && !pt_stream_resize(file, header->size);
+    writer->good = 1;
+    writer->path = path;
+    writer->header.size = file_size(sections);
+    const int error = pt_whole_begin(path, &writer->whole);
+    if (!error)
+        return PATINA_OK;
+    free(writer);
+    *out = NULL;
+    return fail_with(path, "written", error);
+}
+
+void pt_cloud_writer_add(struct pt_cloud_writer *writer, enum pt_array section, const void *data, uint64_t size)
+{
+    const char *from = data;
+    size_t *held = &writer->held[section];
+    writer->good &= size <= writer->left[section];
+    for (uint64_t done = 0; done < size && writer->good;) {
+        const uint64_t some = size - done < PIECE - *held ? size - done : PIECE - *held;
+        const int last = writer->left[section] == some;
+        writer->left[section] -= some;
+        if (!*held && (some == PIECE || last)) { // as it lies
+            write_piece(writer, section, from + done, some);
+        } else if (writer->piece[section] || (writer->piece[section] = malloc(PIECE))) {
+            memcpy(writer->piece[section] + *held, from + done, some);
+            *held += some;
+            if (*held == PIECE || last) {
+                write_piece(writer, section, writer->piece[section], *held);
+                *held = 0;
+            }
+        } else {
+            errno = ENOMEM;
+            writer->good = 0;
+        }
+        done += some;
+    }
+}
+
+static void fill_header(struct header *header, const struct patina_cloud *cloud)
+{
+    memcpy(header->magic, magic, sizeof magic);
+    header->version = VERSION;
+    header->chunk_size = sizeof(struct pt_chunk);
+    header->color_format = cloud->color_format;
+    header->chunk_count = cloud->chunk_count;
+    header->slots = cloud->slots;
+    header->spacing_base = cloud->spacing_base;
+    header->built = cloud->built;
+    header->class_hash = cloud->class_hash;
+    header->sight_count = cloud->sights.count;
+    header->sight_room = cloud->sights.room;
+    header->sight_bytes = cloud->sights.bytes;
+    header->info = cloud->info;
+    header->check = check_of(header, cloud->chunks);
+}
+
+int pt_cloud_writer_end(struct pt_cloud_writer *writer, const struct patina_cloud *cloud)
+{
+    int good = writer->good;
+    for (int i = 0; i < SECTIONS; i++) {
+        good &= !writer->left[i];
+        free(writer->piece[i]);
+    }
+    fill_header(&writer->header, cloud);
+    good = good && !pt_stream_seek(writer->whole.stream, 0) &&
+           fwrite(&writer->header, sizeof writer->header, 1, writer->whole.stream) == 1 &&
+           !pt_stream_resize(writer->whole.stream, writer->header.size);
+    const int error = pt_whole_end(&writer->whole, good);
+    const int code = error ? fail_with(writer->path, "written", error) : PATINA_OK;
+    free(writer);
+    return code;
 }
 
 int patina_cloud_save(const patina_cloud *cloud, const char *path)
@@ -80,31 +168,14 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save: bad arguments");
     struct patina_cloud copy = *cloud;
     struct pt_section sections[SECTIONS];
-    struct header header = {.version = VERSION,
-                            .chunk_size = sizeof(struct pt_chunk),
-                            .color_format = cloud->color_format,
-                            .chunk_count = cloud->chunk_count,
-                            .slots = cloud->slots,
-                            .spacing_base = cloud->spacing_base,
-                            .built = cloud->built,
-                            .class_hash = cloud->class_hash,
-                            .sight_count = cloud->sights.count,
-                            .sight_room = cloud->sights.room,
-                            .sight_bytes = cloud->sights.bytes,
-                            .info = cloud->info};
+    struct pt_cloud_writer *writer;
     pt_cloud_sections(&copy, sections);
-    memcpy(header.magic, magic, sizeof magic);
-    header.size = file_size(sections);
+    const int error = pt_cloud_writer_begin(path, cloud, &writer);
+    if (error)
+        return error;
     for (int i = 0; i < SECTIONS; i++)
-        header.sums[i] = sum_of(&sections[i]);
-    header.check = check_of(&header, cloud->chunks);
-    struct pt_whole whole;
-    int error = pt_whole_begin(path, &whole);
-    if (!error) {
-        int good = write_sections(whole.stream, &header, sections);
-        error = pt_whole_end(&whole, good);
-    }
-    return error ? fail_with(path, "written", error) : PATINA_OK;
+        pt_cloud_writer_add(writer, (enum pt_array)i, *sections[i].data, sections[i].size);
+    return pt_cloud_writer_end(writer, cloud);
 }
 
 // ---- open --------------------------------------------------------------------------------------------------------------

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A terraced town with trees, of any size: its quarters are alike but for their height and colour, so that the file of a billion points is
+// written from one quarter's, without the town ever being in memory.
+#ifndef TEST_TOWN_H
+#define TEST_TOWN_H
+
+#include <stdint.h>
+
+enum { TOWN_QUARTER = 40 }; // metres on a side
+
+// A file of across x across quarters, each of so many points, analysed. Fails the test on error. Returns its bytes.
+uint64_t town_write(const char *path, uint32_t across, uint32_t points);
+
+#endif
