@@ -259,7 +259,7 @@ static void pick_chunk(const struct pick *pick, const struct pt_chunk *chunk, co
             if (!is_drawn(pick, division, slot, v))
                 continue;
         }
-        set_bit(pick->bits, cloud->order[slot]);
+        set_bit(pick->bits, pt_number_of(cloud, slot));
     }
 }
 

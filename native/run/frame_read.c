@@ -138,7 +138,7 @@ int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t instance, u
     for (uint32_t c = 0; c < cloud->chunk_count && !error; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t slot = chunk->first; slot < chunk->first + chunk->count; slot++)
-            values[cloud->order[slot]] = 1.0f - (float)(words[slot] & PT_SHADOW_SUM) * scale;
+            values[pt_number_of(cloud, slot)] = 1.0f - (float)(words[slot] & PT_SHADOW_SUM) * scale;
     }
     free(words);
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;

@@ -72,7 +72,7 @@ int pt_numbering_keys(const struct pt_numbering *numbering, uint64_t *keys, size
             if (!cloud)
                 return PATINA_ERROR_EMPTY;
         }
-        keys[i] = (keys[i] >> 32 << 32) | (of->first_point + cloud->order[id - of->first_slot]);
+        keys[i] = (keys[i] >> 32 << 32) | (of->first_point + pt_number_of(cloud, id - of->first_slot));
     }
     return PATINA_OK;
 }

@@ -145,7 +145,7 @@ static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_ch
     for (uint32_t k = 0; k < 3; k++)
         p[k] = chunk->origin[k] +
                (double)walk->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + slot - chunk->first];
-    return walk->beams.count ? &walk->beams.each[pt_station_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
+    return walk->beams.count ? &walk->beams.each[pt_station_of(walk->desc, pt_number_of(walk->cloud, slot), p)] : NULL;
 }
 
 // A dot is no wider than points lie apart anywhere; a surface, whose rows may lie farther apart, four times that.
@@ -171,7 +171,7 @@ static void limit_point(void *context, uint32_t place, const struct pt_sample *s
     const uint32_t slot = limited->walk->tree.slots[place];
     double p[3];
     const struct pt_beam *beam = beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk], slot, p);
-    if (pt_grids_describe(&limited->walk->grids, limited->walk->desc, slot, limited->walk->cloud->order[slot], hood))
+    if (pt_grids_describe(&limited->walk->grids, limited->walk->desc, slot, pt_number_of(limited->walk->cloud, slot), hood))
         return;
     if (beam)
         pt_beam_limit(beam, p, sample, hood);
@@ -486,8 +486,8 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->surface = analysis->surface;
     cloud->shapes = analysis->shapes;
     cloud->mapped &= ~(1u << PT_ARRAY_SURFACE | 1u << PT_ARRAY_SHAPES);
-    cloud->beside = pt_shapes_beside(cloud->shapes, cloud->slots);
     cloud->chunks = analysis->chunks;
+    cloud->beside = pt_shapes_beside(cloud->shapes, cloud->chunks, cloud->chunk_count);
     cloud->spacing_base = analysis->spacing_base;
     *analysis = (struct pt_analysis){0};
     atomic_store(&cloud->alive->fingerprint, 0);

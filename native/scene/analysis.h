@@ -27,8 +27,9 @@ void pt_analysis_free(struct pt_analysis *analysis);
 // Bit of shape words that no kernel reads: another surface lies beside the point's own, not farther than its neighbours reach.
 #define PT_SHAPE_BESIDE (1u << 30)
 
-// Whether some of a cloud's points, one in a hundred, have another surface beside theirs. One slot in 16 is asked.
-int pt_shapes_beside(const uint32_t *shapes, uint64_t slots);
+// Whether some of a cloud's points, one in a hundred, have another surface beside theirs. One slot in 16 is asked, of large clouds in
+// some 512 chunks that lie evenly among all.
+int pt_shapes_beside(const uint32_t *shapes, const struct pt_chunk *chunks, uint32_t chunk_count);
 
 // Shape words. base: the cloud's spacing_base.
 uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base);

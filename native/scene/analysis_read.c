@@ -38,7 +38,7 @@ static void read_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     for (uint32_t c = begin; c < end; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++) {
             const uint32_t slot = cloud->chunks[c].first + i;
-            const size_t at = cloud->order[slot];
+            const size_t at = pt_number_of(cloud, slot);
             struct pt_neighbourhood hood;
             double n[3];
             const uint32_t bits = normal_of(cloud, slot, n);
@@ -97,10 +97,10 @@ static void read_leaves(void *context, uint32_t begin, uint32_t end, uint32_t th
         pt_neighbours_find(tree, tree, leaf, pt_leaf_lanes(tree, leaf), k, &found);
         for (uint32_t left = pt_leaf_lanes(tree, leaf); left; left &= left - 1) {
             const uint32_t lane = (uint32_t)__builtin_ctz(left), place = leaf * PT_LEAF + lane;
-            const size_t at = reading->cloud->order[tree->slots[place]];
+            const size_t at = pt_number_of(reading->cloud, tree->slots[place]);
             for (uint32_t i = 0; i < found.count[lane]; i++) {
                 if (reading->wanted->numbers)
-                    reading->wanted->numbers[at * k + i] = reading->cloud->order[tree->slots[found.place[lane][i]]];
+                    reading->wanted->numbers[at * k + i] = pt_number_of(reading->cloud, tree->slots[found.place[lane][i]]);
                 if (reading->wanted->distances)
                     reading->wanted->distances[at * k + i] = sqrt(found.square[lane][i]);
             }
@@ -113,7 +113,7 @@ static void read_leaves(void *context, uint32_t begin, uint32_t end, uint32_t th
 }
 
 // In parts of the 99th percentile, at most 1. At most a million points are looked at for it.
-static int normalize(float *values, const uint32_t *order, const patina_cloud *cloud)
+static int normalize(float *values, const patina_cloud *cloud)
 {
     const uint64_t step = cloud->slots / (1 << 20) + 1, room = cloud->slots / step + 1;
     float *sorted = malloc(room * sizeof *sorted);
@@ -121,7 +121,7 @@ static int normalize(float *values, const uint32_t *order, const patina_cloud *c
     if (!sorted)
         return PATINA_ERROR_MEMORY;
     for (uint64_t slot = 0; slot < cloud->slots; slot += step)
-        sorted[count++] = values[order[slot]];
+        sorted[count++] = values[pt_number_of(cloud, slot)];
     qsort(sorted, count, sizeof *sorted, pt_compare_floats);
     const float most = count ? sorted[(count - 1) * 99 / 100] : 0.0f;
     free(sorted);
@@ -161,7 +161,7 @@ static int read_all(struct reading *reading, struct pt_pool *pool)
     pt_neighbours_destroy(&reading->tree);
     if (pt_progress_cancelled(reading->progress))
         return PATINA_ERROR_CANCELLED;
-    return to->uncertainty ? normalize(to->uncertainty, reading->cloud->order, reading->cloud) : PATINA_OK;
+    return to->uncertainty ? normalize(to->uncertainty, reading->cloud) : PATINA_OK;
 }
 
 int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbourhoods *given, patina_progress *progress)

@@ -432,12 +432,12 @@ static void read_color(const patina_array *array, uint64_t index, float rgb[3])
 static int take_color(struct patina_cloud *cloud, const patina_array *color, uint32_t slot)
 {
     if (cloud->color_format == PT_COLOR_SRGB8) {
-        memcpy((uint8_t *)cloud->colors + 3 * (size_t)slot, element(color, cloud->order[slot]), 3);
+        memcpy((uint8_t *)cloud->colors + 3 * (size_t)slot, element(color, pt_number_of(cloud, slot)), 3);
         return 1;
     }
     float *rgb = (float *)cloud->colors + 3 * (size_t)slot;
     int valid = 1;
-    read_color(color, cloud->order[slot], rgb);
+    read_color(color, pt_number_of(cloud, slot), rgb);
     for (int k = 0; k < 3; k++)
         if (!isfinite(rgb[k])) {
             rgb[k] = 0.0f;
@@ -454,7 +454,7 @@ static void attribute_chunk(struct build *build, uint32_t index)
     const struct pt_chunk *chunk = &cloud->chunks[index];
     struct tally *tally = &build->tallies[index];
     for (uint32_t i = 0; i < chunk->padded; i++) {
-        const uint32_t slot = chunk->first + i, from = cloud->order[slot];
+        const uint32_t slot = chunk->first + i, from = pt_number_of(cloud, slot);
         if (build->desc.opacity.data && cloud->opacities) {
             cloud->opacities[slot] = read_opacity(&build->desc.opacity, from);
             tally->translucent |= cloud->opacities[slot] < 255;

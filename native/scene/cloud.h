@@ -85,6 +85,13 @@ struct patina_cloud {
     double spacing_base;     // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
 
+// The caller's number of the point in a slot. That of a damaged file, whose points nobody looked through, leads beyond no array.
+static inline uint32_t pt_number_of(const struct patina_cloud *cloud, uint64_t slot)
+{
+    const uint32_t number = cloud->order[slot], last = (uint32_t)cloud->info.count - 1;
+    return number < last ? number : last;
+}
+
 // Points of a chunk that the first `strata` of PT_STRATA strata hold: every 2^(PT_STRATA - strata)-th in Morton order.
 uint32_t pt_chunk_prefix(const struct pt_chunk *chunk, uint32_t strata);
 

@@ -73,7 +73,7 @@ static int take_scalars(struct patina_cloud *cloud, const patina_array *scalar)
         return PATINA_ERROR_MEMORY;
     float least = INFINITY, most = -INFINITY;
     for (uint64_t i = 0; values && i < cloud->slots; i++) {
-        values[i] = read_value(scalar, cloud->order[i]);
+        values[i] = read_value(scalar, pt_number_of(cloud, i));
         least = isfinite(values[i]) ? fminf(least, values[i]) : least;
         most = isfinite(values[i]) ? fmaxf(most, values[i]) : most;
     }
@@ -145,7 +145,7 @@ static int take_classes(struct patina_cloud *cloud, const patina_array *classes)
         struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t i = 0; i < chunk->padded; i++) {
             const uint32_t slot = chunk->first + i;
-            uint8_t class = *((const uint8_t *)classes->data + cloud->order[slot] * classes->stride);
+            uint8_t class = *((const uint8_t *)classes->data + pt_number_of(cloud, slot) * classes->stride);
             cloud->classes[slot] = class;
             chunk->classes[class / 32] |= 1u << class % 32;
         }

@@ -69,7 +69,7 @@ static double number_of(const struct fill *fill, const struct pt_chunk *chunk, s
     case PATINA_FIELD_CLASSES: return fill->desc->classes[cloud->classes[slot] / 32] >> cloud->classes[slot] % 32 & 1u;
     case PATINA_FIELD_DISTANCE: return distance(fill, chunk, slot);
     case PATINA_FIELD_DENSITY: return density(cloud, chunk, slot);
-    default: return (double)fill->values[cloud->order[slot]];
+    default: return (double)fill->values[pt_number_of(cloud, slot)];
     }
 }
 

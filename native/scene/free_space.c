@@ -65,7 +65,7 @@ static struct sight sight_of(const struct look *look, const struct pt_chunk *chu
 
 static int is_own(const struct look *look, const struct pt_chunk *chunk, uint32_t i)
 {
-    return station_at(look->station, look->job->cloud->order[chunk->first + i]) == look->number;
+    return station_at(look->station, pt_number_of(look->job->cloud, chunk->first + i)) == look->number;
 }
 
 // ---- the grid ----------------------------------------------------------------------------------------------------------------

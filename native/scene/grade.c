@@ -96,7 +96,7 @@ static void grade_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
     for (uint32_t c = begin; c < end; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         for (size_t slot = chunk->first; slot < (size_t)chunk->first + chunk->padded; slot++) {
-            const uint32_t scan = grading->scans ? grading->scans[cloud->order[slot]] : 0;
+            const uint32_t scan = grading->scans ? grading->scans[pt_number_of(cloud, slot)] : 0;
             const struct tone *tone = scan < grading->tone_count && !grading->tones[scan].same ? &grading->tones[scan] : NULL;
             const char *from = (const char *)cloud->colors + slot * size;
             char *to = (char *)grading->grade->colors + slot * size;

@@ -59,7 +59,7 @@ static int survey(const struct patina_cloud *cloud, const patina_analysis_desc *
     uint32_t most = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++) {
-            const uint32_t scan = scan_of(desc, cloud->order[cloud->chunks[c].first + i]);
+            const uint32_t scan = scan_of(desc, pt_number_of(cloud, cloud->chunks[c].first + i));
             most = scan > most ? scan : most;
         }
     out->each = calloc((size_t)most + 1, sizeof *out->each);
@@ -69,7 +69,7 @@ static int survey(const struct patina_cloud *cloud, const patina_analysis_desc *
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++) {
             const struct pt_chunk *chunk = &cloud->chunks[c];
-            const uint32_t number = cloud->order[chunk->first + i];
+            const uint32_t number = pt_number_of(cloud, chunk->first + i);
             const uint64_t row = pt_line_at(&desc->row, number), column = pt_line_at(&desc->column, number);
             struct pt_grid_of *of = &out->each[scan_of(desc, number)];
             double p[3];
@@ -105,7 +105,7 @@ static void fill_cells(const struct patina_cloud *cloud, const patina_analysis_d
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++) {
             const struct pt_chunk *chunk = &cloud->chunks[c];
-            const uint32_t slot = chunk->first + i, number = cloud->order[slot];
+            const uint32_t slot = chunk->first + i, number = pt_number_of(cloud, slot);
             const uint64_t row = pt_line_at(&desc->row, number), column = pt_line_at(&desc->column, number);
             struct pt_grid_of *of = &out->each[scan_of(desc, number)];
             double p[3];
@@ -115,7 +115,7 @@ static void fill_cells(const struct patina_cloud *cloud, const patina_analysis_d
             if (!of->grid.points || row >= of->scan.rows || column >= of->scan.columns)
                 continue;
             uint32_t *cell = &of->grid.points[column * of->scan.rows + row];
-            if (*cell == PT_GRID_NONE || number < cloud->order[*cell])
+            if (*cell == PT_GRID_NONE || number < pt_number_of(cloud, *cell))
                 *cell = slot;
         }
 }

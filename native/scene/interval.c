@@ -80,7 +80,7 @@ static uint32_t look(const struct count *count, const struct pt_chunk *chunk, ui
     double p[3];
     for (uint32_t k = 0; k < 3; k++)
         p[k] = chunk->origin[k] + (double)count->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + i];
-    const uint32_t s = pt_station_of(count->desc, count->cloud->order[chunk->first + i], p);
+    const uint32_t s = pt_station_of(count->desc, pt_number_of(count->cloud, chunk->first + i), p);
     for (int k = 0; k < 3; k++)
         d[k] = p[k] - count->desc->stations[3 * s + k];
     return s;
@@ -102,7 +102,7 @@ static void measure_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
     for (uint32_t c = begin; c < end; c++) {
         const struct pt_chunk *chunk = &count->cloud->chunks[c];
         for (uint32_t i = 0; i < chunk->count; i++) {
-            const uint32_t number = count->cloud->order[chunk->first + i];
+            const uint32_t number = pt_number_of(count->cloud, chunk->first + i);
             struct lines *lines = &count->lines[look(count, chunk, i, d)];
             const uint32_t row = pt_line_at(&count->desc->row, number), column = pt_line_at(&count->desc->column, number);
             most(&lines->rows, row < LINES_MOST ? row + 1 : LINES_MOST + 1);
@@ -126,7 +126,7 @@ static void count_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
     for (uint32_t c = begin; c < end; c++) {
         const struct pt_chunk *chunk = &count->cloud->chunks[c];
         for (uint32_t i = 0; i < chunk->count; i++) {
-            const uint32_t number = count->cloud->order[chunk->first + i], s = look(count, chunk, i, d);
+            const uint32_t number = pt_number_of(count->cloud, chunk->first + i), s = look(count, chunk, i, d);
             const double flat = d[0] * d[0] + d[1] * d[1], length = sqrt(flat + d[2] * d[2]);
             if (!(length > 0.0) || !isfinite(length))
                 continue;

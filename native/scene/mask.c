@@ -36,10 +36,10 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     (void)thread;
     for (uint32_t c = begin; c < end; c++) {
         const struct pt_chunk *chunk = &fill->cloud->chunks[c];
-        const uint32_t *order = fill->cloud->order + chunk->first;
         uint32_t *words = fill->mask->words + chunk->first / PT_SLOTS_A_WORD, hidden = 0;
         for (uint32_t i = 0; i < chunk->padded; i++) {
-            const uint32_t hides = bit_of(fill->hidden, order[i]), selects = bit_of(fill->selected, order[i]);
+            const uint32_t number = pt_number_of(fill->cloud, (uint64_t)chunk->first + i);
+            const uint32_t hides = bit_of(fill->hidden, number), selects = bit_of(fill->selected, number);
             words[i / PT_SLOTS_A_WORD] |= (hides | selects << PT_SLOTS_A_WORD) << i % PT_SLOTS_A_WORD;
             hidden += i < chunk->count && hides;
         }

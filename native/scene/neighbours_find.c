@@ -64,7 +64,10 @@ static void enter_cloud(struct walk *walk)
         set_frame(walk, walk->tree->origin, FRAME_OF_CLOUD);
 }
 
-static uint32_t number(const struct walk *walk, uint32_t place) { return walk->tree->cloud->order[walk->tree->slots[place]]; }
+static uint32_t number(const struct walk *walk, uint32_t place)
+{
+    return pt_number_of(walk->tree->cloud, walk->tree->slots[place]);
+}
 
 // ---- a lane's sorted list --------------------------------------------------------------------------------------------------
 

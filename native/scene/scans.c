@@ -102,7 +102,7 @@ static void take_points(struct patina_scans *out, const struct patina_cloud *clo
         const struct pt_chunk *chunk = &cloud->chunks[c];
         uint16_t least = UINT16_MAX, most = 0;
         for (size_t slot = chunk->first; slot < (size_t)chunk->first + chunk->padded; slot++) {
-            const uint16_t of = scan ? scan[cloud->order[slot]] : 0;
+            const uint16_t of = scan ? scan[pt_number_of(cloud, slot)] : 0;
             out->scan[slot] = of;
             least = of < least ? of : least;
             most = of > most ? of : most;

@@ -71,10 +71,13 @@ void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct p
         out->axis[k] = pt_cos(angle) * t1[k] + pt_sin(angle) * t2[k];
 }
 
-int pt_shapes_beside(const uint32_t *shapes, uint64_t slots)
+int pt_shapes_beside(const uint32_t *shapes, const struct pt_chunk *chunks, uint32_t chunk_count)
 {
+    enum { LOOKED_AT = 512 }; // chunks at least: a file need not be read for it
+    const uint32_t step = chunk_count < 2 * LOOKED_AT ? 1 : chunk_count / LOOKED_AT;
     uint64_t asked = 0, found = 0;
-    for (uint64_t i = 0; i < slots; i += 16, asked++)
-        found += (shapes[i] & PT_SHAPE_BESIDE) != 0;
+    for (uint32_t c = 0; c < chunk_count; c += step)
+        for (uint32_t i = 0; i < chunks[c].padded; i += 16, asked++)
+            found += (shapes[chunks[c].first + i] & PT_SHAPE_BESIDE) != 0;
     return 100 * found > asked;
 }

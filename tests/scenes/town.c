@@ -10,8 +10,8 @@
 #include <string.h>
 
 enum { HOUSES = 6, TREES = 9 };
-#define STOREY 3.0    // metres: a terrace above the one before it
-#define NOISE 0.004   // of a scanner
+#define STOREY 3.0  // metres: a terrace above the one before it
+#define NOISE 0.004 // of a scanner
 #define TAU 6.283185307179586
 
 struct sampler {
@@ -145,7 +145,8 @@ static void add_quarter(struct town *town, const uint32_t place[2])
     for (uint64_t i = 0; i < from->slots; i++)
         town->order[i] = from->order[i] + town->done * (uint32_t)from->info.count;
     for (uint64_t i = 0; i < 3 * from->slots; i++) // of 256ths, another tone a quarter
-        town->colors[i] = (uint8_t)(((const uint8_t *)from->colors)[i] * (200 + (place[0] * 7 + place[1] * (5 + i % 3)) % 56) >> 8);
+        town->colors[i] = (uint8_t)(((const uint8_t *)from->colors)[i] * (200 + (place[0] * 7 + place[1] * (5 + i % 3)) % 56) >>
+                                    8);
     pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, from->positions, from->slots * 12);
     pt_cloud_writer_add(town->writer, PT_ARRAY_ORDER, town->order, from->slots * 4);
     pt_cloud_writer_add(town->writer, PT_ARRAY_SURFACE, from->surface, from->slots * 4);
@@ -171,9 +172,7 @@ static void set_numbers(struct patina_cloud *whole, const patina_cloud *quarter,
 uint64_t town_write(const char *path, uint32_t across, uint32_t points)
 {
     patina_cloud *quarter = make_quarter(points);
-    struct town town = {.quarter = quarter,
-                        .order = malloc(quarter->slots * 4),
-                        .colors = malloc(quarter->slots * 3)};
+    struct town town = {.quarter = quarter, .order = malloc(quarter->slots * 4), .colors = malloc(quarter->slots * 3)};
     uint32_t place[2];
     set_numbers(&town.whole, quarter, across * across);
     if (!town.order || !town.colors || !town.whole.chunks)
