@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A town of twenty million points under --memory: test_rounds.py PATINA TOWN. The same bytes, the memory that was asked for, and what
+the command line tells of it. Needs Python's own library only."""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+
+PATINA, TOWN = (str(Path(path).resolve()) for path in sys.argv[1:3])
+FOLDER = Path()  # a temporary one, set by main
+ACROSS, QUARTER = 7, 400_000  # quarters a side, points of each
+CAP, LEAST_SAVED = 64, 200  # MB: what may be held; that a whole picture takes more
+BESIDE, MAPS = 110, 950  # MB: planes and the program; those of a light's map of 4096 x 4096, and shadow words
+LOOK = "-60,-90,120,140,140,10,45"
+
+
+def run(*arguments, code=0):
+    """What it prints, and the most memory that it held, MB."""
+    with subprocess.Popen([PATINA, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=FOLDER) as child:
+        out, err = child.stdout.read(), child.stderr.read()
+        _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+    assert child.returncode == code, f"{arguments}: exit {child.returncode}, expected {code}: {err}{out}"
+    return out + err, usage.ru_maxrss / 1024
+
+
+def draw(name, *arguments):
+    """The picture's bytes, its statistics, and its peak."""
+    text, peak = run("render", "town.cloud", "-o", name, "--device", "cpu", "--size", "640x360", "--look", LOOK,
+                     "--repeat", 1, "--stats", "json", *arguments)
+    return (FOLDER / name).read_bytes(), json.loads(text[text.index("{"):text.rindex("}") + 1])["mapped"], peak
+
+
+def compare(what, beside, *arguments):
+    whole, fits, most = draw("whole.png", "--memory", "100G", *arguments)
+    rounds, told, peak = draw("rounds.png", "--memory", f"{CAP}M", *arguments)
+    print(f"  {what}: {most:.0f} MB whole, {peak:.0f} MB under {CAP}: {told}")
+    assert whole == rounds, f"{what}: the bytes differ"
+    assert fits["cap"] == 0 and fits["bytes"] > 27 * QUARTER * ACROSS**2, fits
+    assert told["cap"] == CAP * 10**6 and told["held"] < 1.5 * CAP * 10**6 and told["read"] == fits["read"], told
+    assert peak < CAP + beside and peak < most - LEAST_SAVED, (peak, most)
+    return told
+
+
+def test_filled():
+    assert compare("filled", BESIDE, "--surface", "fill")["rounds"] > 6
+
+
+def test_shadows():
+    assert compare("shadows", MAPS, "--surface", "fill", "--lit", "--shadows", "--samples", 1, "--cull")["rounds"] > 6
+
+
+def test_plan():
+    plan, _ = run("render", "town.cloud", "--dump-plan", "--memory", f"{CAP}M", "--size", "640x360", "--look", LOOK, "--device", "cpu")
+    assert "rounds of at most 32.0 MB: clouds in files are larger than the 64.0 MB" in plan, plan
+    assert any(line.lstrip().startswith("run  scatter") and " rounds for " in line for line in plan.splitlines()), plan
+    plan, _ = run("render", "town.cloud", "--dump-plan", "--memory", "100G", "--size", "640x360", "--look", LOOK, "--device", "cpu")
+    assert "rounds" not in plan, plan
+
+
+def test_wrong_sizes():
+    for size in ("", "2", "0G", "-1G", "2Q", "2GB", "nan", "1e40G", "10k"):
+        text, _ = run("render", "town.cloud", "-o", "none.png", "--memory", size, code=2)
+        assert f"'{size}' is no value for option '--memory'" in text, text
+
+
+def main():
+    global FOLDER
+    failed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        FOLDER = Path(folder)
+        subprocess.run([TOWN, FOLDER / "town.cloud", str(ACROSS), str(QUARTER)], check=True, stdout=subprocess.DEVNULL)
+        for name, test in list(globals().items()):
+            if name.startswith("test_"):
+                try:
+                    test()
+                    print(f"ok   {name}")
+                except Exception:
+                    failed += 1
+                    print(f"FAIL {name}\n{traceback.format_exc()}")
+    sys.exit(failed > 0)
+
+
+if __name__ == "__main__":
+    main()
