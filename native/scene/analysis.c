@@ -487,7 +487,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->shapes = analysis->shapes;
     cloud->mapped &= ~(1u << PT_ARRAY_SURFACE | 1u << PT_ARRAY_SHAPES);
     cloud->chunks = analysis->chunks;
-    cloud->beside = pt_shapes_beside(cloud->shapes, cloud->chunks, cloud->chunk_count);
+    cloud->beside = pt_shapes_beside(cloud);
     cloud->spacing_base = analysis->spacing_base;
     *analysis = (struct pt_analysis){0};
     atomic_store(&cloud->alive->fingerprint, 0);

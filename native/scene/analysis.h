@@ -29,7 +29,7 @@ void pt_analysis_free(struct pt_analysis *analysis);
 
 // Whether some of a cloud's points, one in a hundred, have another surface beside theirs. One slot in 16 is asked, of large clouds in
 // some 512 chunks that lie evenly among all.
-int pt_shapes_beside(const uint32_t *shapes, const struct pt_chunk *chunks, uint32_t chunk_count);
+int pt_shapes_beside(const struct patina_cloud *cloud);
 
 // Shape words. base: the cloud's spacing_base.
 uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base);

@@ -280,7 +280,7 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
     for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
         cloud->mapped |= (uint32_t)(sections[i].size > 0) << i;
     code = check_cloud(path, cloud);
-    cloud->beside = !code && cloud->shapes && pt_shapes_beside(cloud->shapes, chunks, cloud->chunk_count);
+    cloud->beside = !code && cloud->shapes && pt_shapes_beside(cloud);
     return code;
 }
 
