@@ -37,7 +37,7 @@ SURFACE = {"AUTO": 0, "SPLATS": 1, "FILL": 2, "RANGES": 3}
 DEPTH = {"POINT": 0, "SURFACE": 1}
 SMOOTH = {"ALLEVIATED": 0, "GAUSSIAN": 1, "BOX": 2, "OFF": 3}
 ANTIALIAS = {"LAYERS": 0, "BACKGROUND": 1, "OFF": 2}
-EFFECT_CHOICE = {"NO_CHOICE": 0, "CONTOUR_HEIGHT": 0, "CONTOUR_PLANE": 1}
+EFFECT_CHOICE = {"NO_CHOICE": 0, "CONTOUR_HEIGHT": 0, "CONTOUR_PLANE": 1, "CONTOUR_ATTRIBUTE": 2}
 LINE_SOURCE = {"FIXED": 0, "POINT": 1, "DEPTH": 2}
 LINE_SURFACE = {"SHOWN": 0, "PAPER": 1, "NONE": 2}
 WRAP = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2}
@@ -467,7 +467,7 @@ EFFECTS = (
      "fields": (
          {"name": "contour_source", "kind": "CHOICE", "property": "contour_source", "when": "PART", "label": "Along",
           "about": "What is equal on a line",
-          "items": (("HEIGHT", "Height", "The world's height"), ("PLANE", "Distance from a Plane", "The distance from a plane through the world's origin"))},
+          "items": (("HEIGHT", "Height", "The world's height"), ("PLANE", "Distance from a Plane", "The distance from a plane through the world's origin"), ("ATTRIBUTE", "Attribute", "An attribute of the points: the ramp's, or what their Color panel names"))},
          {"name": "contour_axis", "kind": "AXIS", "property": "contour_axis", "when": "contour_source=PLANE",
           "label": "Plane's Normal", "about": "What the plane stands across"},
          {"name": "contour_start", "kind": "NUMBER", "property": "contour_start", "when": "PART", "label": "Start",

@@ -35,6 +35,9 @@ class PatinaColorProperties(PropertyGroup):
             ('DISTANCE', "Distance", "A ramp over the distance from the camera", 5)))
     scalar: StringProperty(
         name="Attribute", override=_OVERRIDE, description="Point attribute that the ramp is laid over")
+    contour: StringProperty(
+        name="Contour Attribute", override=_OVERRIDE,
+        description="Point attribute that contour lines along an attribute follow; a ramp over an attribute brings its own")
     ramp: EnumProperty(
         name="Ramp", override=_OVERRIDE, default='VIRIDIS',
         description="Colors from the least value to the greatest",

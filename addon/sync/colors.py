@@ -33,8 +33,9 @@ def style_fields(obj: bpy.types.Object) -> dict[str, Any]:
 
 
 def scalar_name(obj: bpy.types.Object) -> str:
-    """The attribute that a ramp is laid over; empty where there is no such ramp."""
-    return obj.patina.colors.scalar if obj.patina.colors.source == 'SCALAR' else ""
+    """The attribute that a ramp is laid over, else that which contour lines follow: a cloud has one. Empty: none."""
+    group = obj.patina.colors
+    return group.scalar if group.source == 'SCALAR' else group.contour
 
 
 def _ramp(group: bpy.types.PropertyGroup) -> bytes:

@@ -43,6 +43,11 @@ class PATINA_PT_color(ColorPanel, Panel):
                 layout.prop(group, "scalar")
             else:
                 layout.prop_search(group, "scalar", obj.data, "attributes")
+        elif context.scene.patina.effects.contour_source == 'ATTRIBUTE':
+            if obj.patina.linked_file:
+                layout.prop(group, "contour")
+            else:
+                layout.prop_search(group, "contour", obj.data, "attributes")
         if group.source not in {'OWN', 'FIXED'}:
             self._draw_ramp(group)
         layout.prop(group, "exposure")

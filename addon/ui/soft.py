@@ -7,6 +7,7 @@ import bpy
 from bpy.types import Context, Object, Panel, PropertyGroup, UILayout
 
 from .. import histogram
+from ..sync.colors import scalar_name
 from . import rows
 from .colors import ColorPanel
 
@@ -34,9 +35,9 @@ class PATINA_PT_soft(ColorPanel, Panel):
             layout.prop(group, "attribute")
             if not obj.patina.linked_file:
                 layout.operator("object.patina_analyze", text="Analyze to Attributes").soft = True
-            clash = obj.patina.linked_file and obj.patina.colors.source == 'SCALAR' and obj.patina.colors.scalar != group.attribute
-            if clash:
-                layout.label(text="A linked file gives one column: the color ramp's", icon='INFO')
+            other = scalar_name(obj)
+            if obj.patina.linked_file and other and other != group.attribute:
+                layout.label(text=f"A linked file gives one column: '{other}'", icon='INFO')
         if group.by == 'CLASSES':
             layout.prop(group, "classes")
         if group.by == 'DISTANCE':

@@ -5,8 +5,8 @@
 #include <stdio.h>
 
 static const struct pointwise {
-    int keys, shading, albedo, clips, color, result; // which of its buffers these are, -1: none
-    const char *name;                                // NULL: not pointwise
+    int keys, shading, albedo, slopes, clips, color, result; // which of its buffers these are, -1: none
+    const char *name;                                        // NULL: not pointwise
 } kernels[PT_KERNEL_COUNT] = {
 #define PT_POINTWISE(name, ...) [PT_KERNEL_##name] = {__VA_ARGS__, #name},
 #include "pointwise.def"
@@ -23,8 +23,8 @@ static int program(struct pt_gl_device *d, enum pt_kernel kernel)
         return PATINA_OK;
     snprintf(definitions, sizeof definitions,
              "#define PT_ARGUMENTS %s_args\n#define PT_RUN pt_%s\n#define KEYS %d\n#define SHADING %d\n#define ALBEDO %d\n"
-             "#define CLIPS %d\n#define RESULT %d\n",
-             k->name, k->name, k->keys >= 0, k->shading >= 0, k->albedo >= 0, k->clips >= 0, k->result >= 0);
+             "#define SLOPES %d\n#define CLIPS %d\n#define RESULT %d\n",
+             k->name, k->name, k->keys >= 0, k->shading >= 0, k->albedo >= 0, k->slopes >= 0, k->clips >= 0, k->result >= 0);
     snprintf(body, sizeof body, "pointwise/%s.h", k->name);
     return pt_gl_program_of_body(d, "lib/pointwise.glsl", definitions, body, &d->programs[kernel][0]);
 }

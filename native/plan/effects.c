@@ -199,17 +199,80 @@ static double extent(const struct box *box, const double axis[3])
     return length;
 }
 
-static void plan_contour(struct pt_builder *builder, enum pt_plane color)
+static int follows_values(const struct patina_scene *scene)
 {
-    const struct patina_scene *scene = builder->scene;
-    const patina_effects *effects = &scene->effects;
-    if (!(effects->contour_opacity > 0.0f)) {
-        pt_skip(builder, "contour", "no contour lines are asked for");
+    return scene->effects.contour_opacity > 0.0f && scene->effects.contour_source == PATINA_CONTOUR_ATTRIBUTE;
+}
+
+static int has_values(const struct pt_plan_instance *instance)
+{
+    return instance->chunk_count && instance->instance->cloud->info.has_scalars;
+}
+
+// Of the scalars of what is in view; least > most where there are none.
+static void values_range(const struct pt_plan *plan, double range[2])
+{
+    range[0] = INFINITY;
+    range[1] = -INFINITY;
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        const float *own = plan->instances[i].instance->cloud->info.scalar_range;
+        if (!has_values(&plan->instances[i]))
+            continue;
+        range[0] = fmin(range[0], (double)own[0]);
+        range[1] = fmax(range[1], (double)own[1]);
+    }
+}
+
+// A bold line in the middle of the range: values less that are small.
+static double values_offset(const patina_effects *effects, const double range[2], double interval)
+{
+    const double start = (double)effects->contour_start, bold = interval * effects->contour_every;
+    const double offset = start + bold * round((0.5 * (range[0] + range[1]) - start) / bold);
+    return isfinite(offset) ? offset : start;
+}
+
+static double values_interval(const patina_effects *effects, const double range[2])
+{
+    const double interval = (double)effects->contour_interval;
+    return interval > 0.0 ? interval : usual_interval(range[1] - range[0]);
+}
+
+void pt_plan_values(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    const patina_effects *effects = &builder->scene->effects;
+    double range[2];
+    values_range(plan, range);
+    if (!follows_values(builder->scene) || range[0] > range[1]) {
+        const char *reason = follows_values(builder->scene) ? "no cloud in view has scalars"
+                                                            : "no lines along an attribute are asked for";
+        pt_skip(builder, "value", reason);
+        pt_skip(builder, "slope", reason);
         return;
     }
-    const int bold = effects->contour_every > 1;
-    struct contour_args args = {
-        .view = builder->plan->view, .eye_z = pt_eye_z(scene), .opacity = effects->contour_opacity, .kinds = bold ? 2 : 1};
+    struct value_args args = {.first = 1};
+    args.offset = (float)values_offset(effects, range, values_interval(effects, range));
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        if (!has_values(&plan->instances[i]))
+            continue;
+        args.view = args.first ? plan->view : pt_view_filled(plan, &plan->instances[i]);
+        args.instance = plan->instances[i].args;
+        PT_REASON(PT_ADD(builder, value, args,
+                         {pt_keys_of(builder, 0), pt_buffer_of(PT_SCALARS, i), pt_plane_at(PT_PLANE_VALUES, 0)}),
+                  "instance %u: contour lines follow its scalars", i);
+        args.first = 0;
+    }
+    const struct slope_args slope = {.view = plan->view};
+    PT_REASON(PT_ADD(builder, slope, slope,
+                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0), pt_span_of(plan),
+                      pt_plane_at(PT_PLANE_VALUES, 0), pt_plane_at(PT_PLANE_SLOPES, 0)}),
+              "what the scalars are about each pixel, and grow by");
+}
+
+// Sets the axis of a height, and its offset; returns the interval.
+static double set_contour_height(const struct patina_scene *scene, struct contour_args *args)
+{
+    const patina_effects *effects = &scene->effects;
     double axis[3] = {0.0, 0.0, 1.0}, camera[9], position[3], view[3];
     for (int k = 0; k < 3 && effects->contour_source == PATINA_CONTOUR_PLANE; k++)
         axis[k] = (double)effects->contour_axis[k];
@@ -222,7 +285,31 @@ static void plan_contour(struct pt_builder *builder, enum pt_plane color)
     pt_camera_axes(&scene->camera, camera, position);
     pt_apply(camera, axis, view);
     // counted in float64 from the bold line next to the camera: what float32 adds to it is the distance from the camera
-    args.offset = (float)remainder(pt_dot(axis, position) - (double)effects->contour_start, interval * effects->contour_every);
+    args->offset = (float)remainder(pt_dot(axis, position) - (double)effects->contour_start, interval * effects->contour_every);
+    for (int k = 0; k < 3; k++)
+        args->axis[k] = (float)view[k];
+    return interval;
+}
+
+static void plan_contour(struct pt_builder *builder, enum pt_plane color)
+{
+    const struct patina_scene *scene = builder->scene;
+    const patina_effects *effects = &scene->effects;
+    if (!(effects->contour_opacity > 0.0f)) {
+        pt_skip(builder, "contour", "no contour lines are asked for");
+        return;
+    }
+    const int bold = effects->contour_every > 1;
+    struct contour_args args = {
+        .view = builder->plan->view, .eye_z = pt_eye_z(scene), .opacity = effects->contour_opacity, .kinds = bold ? 2 : 1};
+    double range[2];
+    values_range(builder->plan, range);
+    if (follows_values(scene) && range[0] > range[1]) {
+        pt_skip(builder, "contour", "no cloud in view has scalars");
+        return;
+    }
+    args.of_values = (uint32_t)follows_values(scene);
+    const double interval = args.of_values ? values_interval(effects, range) : set_contour_height(scene, &args);
     const float widths[PT_CONTOUR_KINDS] = {effects->contour_width, effects->contour_bold};
     for (uint32_t i = 0; i < PT_CONTOUR_KINDS; i++) {
         double apart = i ? interval * effects->contour_every : interval, even = 2.0 * fmax((double)widths[i], 1.0);
@@ -232,12 +319,13 @@ static void plan_contour(struct pt_builder *builder, enum pt_plane color)
         args.even[i] = (float)even;
         args.per_even[i] = (float)(1.0 / even);
     }
-    for (int k = 0; k < 3; k++) {
-        args.axis[k] = (float)view[k];
+    for (int k = 0; k < 3; k++)
         args.color[k] = effects->contour_color[k];
-    }
-    PT_REASON(PT_ADD(builder, contour, args, {pt_keys_of(builder, 0), pt_shading_of(builder), pt_plane_at(color, 0)}),
-              "contour lines %.4g apart, %.1f pixels wide", interval, (double)args.width[0]);
+    PT_REASON(PT_ADD(builder, contour, args,
+                     {pt_keys_of(builder, 0), pt_shading_of(builder), pt_plane_if(args.of_values != 0, PT_PLANE_SLOPES, 0),
+                      pt_plane_at(color, 0)}),
+              "contour lines %.4g apart%s, %.1f pixels wide", interval, args.of_values ? " in the scalars" : "",
+              (double)args.width[0]);
 }
 
 // ---- fog ---------------------------------------------------------------------------------------------------------------
@@ -333,7 +421,8 @@ void pt_plan_paper(struct pt_builder *builder)
 
 int pt_effects_want_normals(const struct patina_scene *scene)
 {
-    return scene->effects.obscurance_strength > 0.0f || scene->effects.hatch_levels || scene->effects.contour_opacity > 0.0f;
+    return scene->effects.obscurance_strength > 0.0f || scene->effects.hatch_levels ||
+           (scene->effects.contour_opacity > 0.0f && !follows_values(scene));
 }
 
 int pt_effects_want_albedo(const struct patina_scene *scene) { return scene->effects.toon_bands > 0; }
@@ -360,6 +449,8 @@ uint32_t pt_effects_reach(const struct patina_scene *scene)
         reach += (uint32_t)lround((double)effects->edl_radius);
     if (effects->obscurance_strength > 0.0f)
         reach += PT_REACH_obscure;
+    if (follows_values(scene))
+        reach += PT_REACH_slope;
     if (focuses(scene))
         reach += PT_REACH_focus;
     return reach;

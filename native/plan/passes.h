@@ -129,6 +129,8 @@ int pt_plan_depth(struct pt_builder *builder);
 
 int pt_effects_want_normals(const struct patina_scene *scene);
 int pt_effects_want_albedo(const struct patina_scene *scene);
+// Before shading: what drawn effects know of the points that pixels show.
+void pt_plan_values(struct pt_builder *builder);
 // On what shading gave, in place: before smoothing.
 void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color);
 // On the smoothed colour, in place.

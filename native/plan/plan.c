@@ -603,6 +603,7 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     pt_plan_lines(builder);
     plan_shadows(builder);
     pt_plan_soft_layer(builder);
+    pt_plan_values(builder);
     uint32_t tail = plan->pass_count;
     for (int own = pt_effects_want_albedo(builder->scene); own >= 0; own--) { // normals are shown by the last
         enum pt_plane shaded = own ? PT_PLANE_UNLIT : PT_PLANE_COLOR_A;

@@ -37,6 +37,8 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(LIGHT, u32, LIGHTS, ONE, 0)                                                                                              \
     X(OFFSET, f32, WINDOW, ONE, 0)                                                                                             \
     X(OBSCURED, f32, WINDOW, ONE, 0)                                                                                           \
+    X(VALUES, f32, WINDOW, ONE, 0)                                                                                             \
+    X(SLOPES, f32x4, WINDOW, ONE, 0)                                                                                           \
     X(UNLIT, f32x4, WINDOW, ONE, 0)                                                                                            \
     X(COLOR_A, f32x4, WINDOW, ONE, 0)                                                                                          \
     X(COLOR_B, f32x4, WINDOW, ONE, 0)                                                                                          \

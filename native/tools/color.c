@@ -97,6 +97,8 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
         return parse_ramp(value, color) ? -1 : 0;
     if (!strcmp(name, "--ramp-colors"))
         return *(color->ramp = value) ? 0 : -1;
+    if (!strcmp(name, "--attribute"))
+        return *(color->scalar = value) ? 0 : -1;
     if (!strcmp(name, "--color")) {
         color->source = PATINA_COLOR_FIXED;
         const int count = parse_numbers(value, n, 3, 3);
@@ -153,11 +155,18 @@ static int read_numbers(const patina_file *file, const char *name, const char *w
     return *out ? patina_file_read_attribute(file, index, *out, info.count * sizeof **out) : PATINA_ERROR_MEMORY;
 }
 
-static int take_scalars(const patina_file *file, const char *name, patina_cloud *cloud)
+// A cloud has one: the ramp's, or that which lines follow.
+static int take_scalars(const patina_file *file, const struct tool_color *color, patina_cloud *cloud)
 {
+    const int ramp = color->source == PATINA_COLOR_SCALAR;
     float *values = NULL;
     uint64_t count;
-    int code = read_numbers(file, name, "make a ramp of", &count, &values);
+    if (ramp && color->scalar && strcmp(color->attribute, color->scalar) != 0) {
+        tool_say("lines along '%s' and a ramp over '%s': both are of one attribute", color->scalar, color->attribute);
+        return PATINA_ERROR_ARGUMENT;
+    }
+    int code = read_numbers(file, ramp ? color->attribute : color->scalar, ramp ? "make a ramp of" : "draw lines along", &count,
+                            &values);
     const patina_array scalars = {.data = values, .type = PATINA_FLOAT32, .components = 1};
     if (!code)
         code = patina_cloud_set_scalars(cloud, &scalars);
@@ -185,8 +194,10 @@ static int open_saved(const char *path, const struct tool_color *color, const ch
     }
     if (!code)
         code = patina_cloud_get_info(*out, &info);
-    if (!code && color->source == PATINA_COLOR_SCALAR && !info.has_scalars) {
-        tool_say("there is no attribute in '%s' to make a ramp of: convert it with --attribute %s", path, color->attribute);
+    const int ramp = color->source == PATINA_COLOR_SCALAR;
+    if (!code && (ramp || color->scalar) && !info.has_scalars) {
+        tool_say("there is no attribute in '%s' to %s: convert it with --attribute %s", path,
+                 ramp ? "make a ramp of" : "draw lines along", ramp ? color->attribute : color->scalar);
         code = PATINA_ERROR_ARGUMENT;
     }
     return code;
@@ -202,8 +213,8 @@ int tool_load_cloud(const char *path, const struct tool_color *color, const char
     int code = patina_file_open(path, progress, &file);
     if (!code)
         code = patina_file_cloud(file, 0, progress, out);
-    if (!code && color->source == PATINA_COLOR_SCALAR)
-        code = take_scalars(file, color->attribute, *out);
+    if (!code && (color->source == PATINA_COLOR_SCALAR || color->scalar))
+        code = take_scalars(file, color, *out);
     if (!code && attribute[0])
         code = read_numbers(file, attribute, "divide soft points by", &count, numbers);
     if (!code)

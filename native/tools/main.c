@@ -60,6 +60,7 @@ static const char usage_before[] =
     "  --color R,G,B                      linear, of all points\n"
     "  --ramp height|distance|ATTRIBUTE[,MIN,MAX]   colours by height, distance to the eye, or a scalar of the file\n"
     "  --ramp-colors NAME                 viridis, grey, heat, spectrum, relief, diverging, classes\n"
+    "  --attribute NAME                   the scalar of the file that --effect contour_source=attribute follows (the ramp's)\n"
     "  --exposure STOPS, --contrast C     of the points' colours, before light\n"
     "  --hide-classes N[,N...]            points of these classes are left out\n"
     "  --hide-kinds KIND[,KIND...]        points of these kinds are left out: unknown, surface, border, line, volume, stray\n"

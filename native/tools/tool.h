@@ -48,6 +48,7 @@ enum { TOOL_MOST_SIZE = 65536, TOOL_OPACITIES = 64, TOOL_MESHES = 64, TOOL_CLIPS
 struct tool_color {
     uint32_t source; // patina_color_source
     char attribute[64];
+    const char *scalar; // the attribute that contour lines follow; NULL: the ramp's
     double range[2];
     int has_range;
     const char *ramp; // NULL: viridis

@@ -17,6 +17,7 @@ struct pt_here { // the pixel, as a body sees it
     uint x, y;       // in the plane, or in the crop
     float normal[3]; // the one shown
     float albedo[3];
+    float slope[4];
 };
 
 #define PT_STRUCT

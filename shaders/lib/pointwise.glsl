@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The walk of a pointwise kernel: reads what its body asks for, runs that, writes colours. native/device_gl/pointwise.c defines
 //   PT_ARGUMENTS, PT_RUN: struct and function of the body;   KEYS, SHADING, ALBEDO: whether it reads these planes
+//   SLOPES: whether it may read those; where ARGS.of_values is 0 none are bound
 //   CLIPS, RESULT: whether it has these. A result is a picture of the crop; else the colours are changed in place, and a picture
 //   without keys is the crop.
 #version 430 core
@@ -66,6 +67,11 @@ void run(uint at, uint to, uint x, uint y)
     other = texelFetch(other_float4_plane, int(at));
     for (int k = 0; k < 3; k++)
         here.albedo[k] = other[k];
+#endif
+#if SLOPES
+    vec4 slope = ARGS.of_values != 0u ? texelFetch(other_float4_plane, int(at)) : vec4(0.0);
+    for (int k = 0; k < 4; k++)
+        here.slope[k] = slope[k];
 #endif
 #if RESULT
     vec4 before = read_float4(at);

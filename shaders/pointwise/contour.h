@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// contour: lines where a height is a multiple of an interval.
+// contour: lines where a height, or another value, is a multiple of an interval.
 
 #include "shared/effects.h"
 
@@ -49,12 +49,22 @@ PT_BODY(contour)
     precise vf turn = ((a * view[0] + b * view[1]) + c * view[2]) * back;
     precise vf gx = width[0] * (a - turn * n[0]), gy = width[1] * (b - turn * n[1]);
     precise vf square = gx * gx + gy * gy;
+    if (ARGS.of_values != 0u) {
+        precise vf rate = HERE.slope[1] * HERE.slope[1] + HERE.slope[2] * HERE.slope[2];
+        along = HERE.slope[0];
+        square = rate;
+    }
     vf root = vf_rsqrt(vf_max(square, vf_set(1e-30f)));
     // how steep it is: squares of sines; without a normal, as if it stood
     precise vf sx = b * n[2] - c * n[1], sy = c * n[0] - a * n[2], sz = a * n[1] - b * n[0];
     precise vf steep = (sx * sx + sy * sy) + sz * sz, unit = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
     steep = vf_select(vf_lt(unit, vf_set(0.5f)), vf_set(1.0f), steep);
     precise vf shown = vf_min(vf_max((steep - PT_CONTOUR_FLAT) * PT_CONTOUR_RISE, vf_set(0.0f)), vf_set(1.0f)) * ARGS.opacity;
+    if (ARGS.of_values != 0u) {
+        precise vf near = vf_min(vf_max(2.0f - (ARGS.interval[0] * root) * PT_CONTOUR_PER_APART, vf_set(0.0f)), vf_set(1.0f));
+        precise vf known = near * (HERE.slope[3] * ARGS.opacity);
+        shown = known;
+    }
     vf covered = contour_lines(PT_GIVES along, root, 0u);
     if (ARGS.kinds > 1u)
         covered = vf_max(covered, contour_lines(PT_GIVES along, root, 1u));

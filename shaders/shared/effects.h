@@ -80,17 +80,43 @@ struct hatch_args {
     float axes[3 * PT_HATCH_LEVELS]; // unit, view space
 };
 
+#define PT_VALUE_MOST 1e30f // values beyond it count as it
+
+// value: scalar - offset of the point shown; where it is not finite, NaN.
+struct value_args {
+    struct view_args view;
+    struct instance_args instance;
+    float offset;
+    uint32_t first; // 1: pixels of other instances become NaN
+};
+
+#define PT_SLOPE_LEAST 2.0f // pixels: of 5 x 5 values noise of one counts a tenth
+#define PT_SLOPE_MOST 32    // pixels
+#define PT_SLOPE_TAPS 8     // on each side; wider windows take every second pixel, or fewer
+#define PT_SLOPE_GRAZING 0.1f // least |n . v|
+#define PT_SLOPE_RIDGE 0.0078125f // pixels squared: of values that lie in a line, nothing is said across it
+#define PT_SLOPE_STEEPEST 1e18f
+
+// slope: of the values around a pixel, the plane v + g . (x, y) that fits them best by weighted least squares, RIDGE added to the
+// variance of x and of y. Taken are pixels of the same layer, |z_q - z| <= d_eff, of which something is known, within a radius r of
+// d_eff |n . v| / footprint(z), which is two spacings in pixels, rounded, from LEAST to MOST; weight 1 - |q|^2 / (r + 1)^2, above 0. Of a radius above
+// TAPS every s-th row and column are taken, s = ceil(r / TAPS), counted from the pixel.
+struct slope_args {
+    struct view_args view;
+};
+
 #define PT_CONTOUR_KINDS 2       // all lines; of every few of them one, bold
 #define PT_CONTOUR_GRAZING 1e-3f // least (n . r)^2: 88 degrees
 #define PT_CONTOUR_FLAT 1.6e-5f  // sin^2 of 0.23 degrees: a flatter surface is level. Else a floor whose height is that of a line would be
                                  // one blot
 #define PT_CONTOUR_RISE 3472.2222f // 1 / (sin^2 of a degree - FLAT): from there on lines are wholly seen
+#define PT_CONTOUR_PER_APART 2.44140625e-4f // 1 / 4096: lines of an attribute that lie so many pixels apart and more fade away, till twice that
 
 // contour: lines where the height h = axis . p + offset is a multiple of an interval, as wide on screen at any slope: the surface goes on
 // in its tangent plane, so that from pixel to pixel h grows by |g|, g = w (a - (a . r) n / (n . r)) along x and y, w a pixel's width at p.
 // With d = |h / interval - round| interval / |g|, pixels, a line covers clamp(width / 2 - d + 1/2, 0, 1) min(width, 1). Where lines are
 // less than 2 `even` pixels apart (even = 2 max(width, 1)) that goes over into an even tone, width / apart, which at `even` and less is
-// width / even. What kinds of lines cover most counts; times opacity, less on what is nearly level.
+// width / even. What kinds of lines cover most counts; times opacity, less on what is nearly level. Of values, h and g are what slope found.
 struct contour_args {
     struct view_args view;
     float eye_z;   // orthographic: near, as in shade
@@ -98,7 +124,8 @@ struct contour_args {
     float offset;  // of the camera along the axis, less whole bold intervals
     float opacity;
     float color[3];
-    uint32_t kinds; // 1, 2
+    uint32_t kinds;     // 1, 2
+    uint32_t of_values; // 1: lines of equal values, by the slopes plane
     float interval[PT_CONTOUR_KINDS], inverse[PT_CONTOUR_KINDS]; // 1 / interval
     float width[PT_CONTOUR_KINDS];                               // pixels
     float even[PT_CONTOUR_KINDS], per_even[PT_CONTOUR_KINDS];    // 1 / even

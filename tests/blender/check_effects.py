@@ -211,6 +211,35 @@ def test_contour():
     check(ink_of(level).max() == 0.0, "a level floor at a line's height is inked")
 
 
+def test_contour_along_attribute():
+    """Lines follow the attribute that the points' Color panel names, or their ramp's, on a level floor too; a mesh has none; what lacks
+    the attribute is told of."""
+    scene = slope_scene(0.0)
+    scene.patina.effects.contour_source, scene.patina.effects.contour_interval = 'ATTRIBUTE', 0.5
+    obj = next(obj for obj in bpy.data.objects if obj.name.startswith("points"))
+    places = np.empty(3 * len(obj.data.vertices), np.float32)
+    obj.data.vertices.foreach_get("co", places)
+    obj.data.attributes.new("along", 'FLOAT', 'POINT').data.foreach_set("value", 2.0 * places[0::3] + 0.25)
+    check(ink_of(scene).max() == 0.0, "lines along no attribute")
+    obj.patina.colors.contour = "along"
+    ink = ink_of(scene)  # a line a quarter of a unit
+    check(abs(ink.sum() / 16.0 - 2.0) < 0.3, f"a line is {ink.sum() / 16.0:.2f} pixels wide")
+    scene.patina.effects.contour_interval = 1.0
+    ink = ink_of(scene)
+    away = np.abs(((np.arange(96) + 0.5) / 24.0 - 2.0 + 0.125 + 0.25) % 0.5 - 0.25) * 24.0
+    check(ink[away > 2.6].max() < 0.01, f"ink {ink[away > 2.6].max():.3f} between lines")
+    check(abs(ink.sum() / 8.0 - 2.0) < 0.3, f"a line is {ink.sum() / 8.0:.2f} pixels wide")
+    obj.patina.colors.contour = "nowhere"
+    check(ink_of(scene).max() == 0.0, "lines along an attribute that is not there")
+    obj.patina.colors.contour, obj.patina.colors.source, obj.patina.colors.scalar = "", 'SCALAR', "along"
+    obj.patina.lighting, obj.patina.colors.ramp, obj.patina.colors.use_range = 'UNLIT', 'GREY', True
+    obj.patina.colors.range_min, obj.patina.colors.range_max = -101.0, -100.0  # white
+    check_close(ink_of(scene), ink, 1e-5, "along the ramp's attribute")
+    bpy.ops.mesh.primitive_plane_add(size=10.0, location=(0.0, 0.0, -2.0))
+    picture = render()["Combined"]
+    check((picture[..., 3] > 0.99).all() and np.ptp(picture[..., :3]) < 1e-3, "lines on a mesh")
+
+
 def test_paper():
     """Tint and grain over all of an opaque film, deterministic; a transparent film keeps its alpha."""
     scene = dense_scene()

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-void effect_check(struct harness *h, const struct effect *effect, const void *args, size_t size, const struct picture *picture,
-                  const float *albedo)
+static void check(struct harness *h, const struct effect *effect, const void *args, size_t size, const struct picture *picture,
+                  const float *albedo, const float *slopes)
 {
     size_t count = picture->count, open = 0;
     float *before = harness_alloc(h, count * 16);
@@ -19,12 +19,14 @@ void effect_check(struct harness *h, const struct effect *effect, const void *ar
         bound[bindings++] = *b == 'k'   ? harness_buffer(h, picture->keys, count * 8)
                             : *b == 'n' ? harness_buffer(h, picture->normal, count * 16)
                             : *b == 'a' ? harness_buffer(h, albedo, count * 16)
+                            : *b == 's' ? (slopes ? harness_buffer(h, slopes, count * 16) : NULL)
                                         : color;
     harness_run(h, effect->kernel, args, size, bound, bindings);
     const float *got = harness_read(h, color);
     struct ref_planes planes = picture_planes(picture);
     planes.shading = picture->normal;
     planes.albedo = albedo;
+    planes.slopes = slopes;
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % picture->view.width), y = (int)(i / picture->view.width);
         if (picture->keys[i] == REF_EMPTY_KEY) {
@@ -40,6 +42,18 @@ void effect_check(struct harness *h, const struct effect *effect, const void *ar
                              expected.color[c], expected.error[c]);
     }
     harness_unsure(h, open, count, TOL_UNSURE_SHARE);
+}
+
+void effect_check(struct harness *h, const struct effect *effect, const void *args, size_t size, const struct picture *picture,
+                  const float *albedo)
+{
+    check(h, effect, args, size, picture, albedo, NULL);
+}
+
+void effect_check_slopes(struct harness *h, const struct effect *effect, const void *args, size_t size,
+                         const struct picture *picture, const float *slopes)
+{
+    check(h, effect, args, size, picture, NULL, slopes);
 }
 
 struct picture effect_picture(struct harness *h, uint64_t seed, uint32_t width, uint32_t height, int perspective,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // contour: perspective and orthographic views, all slopes, intervals from far finer than pixels to wider than the picture, level
-// surfaces, surfaces edge-on and without normals, far ones.
+// surfaces, surfaces edge-on and without normals, far ones; lines of values that change slowly, fast and not at all.
 #include "effect.h"
 #include "shared/effects.h"
 
@@ -12,7 +12,7 @@ static struct ref_color reference(const void *args, const struct ref_planes *pla
     return ref_contour(args, planes, x, y);
 }
 
-static const struct effect contour = {PT_KERNEL_contour, reference, "knc"};
+static const struct effect contour = {PT_KERNEL_contour, reference, "knsc"};
 
 static void set_kind(struct contour_args *args, int kind, float interval, float width)
 {
@@ -74,13 +74,42 @@ static void hard(struct harness *h)
             struct contour_args args = args_of(&picture.view, intervals[i], 1.0f, 2);
             struct pt_buffer *color = harness_buffer(h, picture.color, picture.count * 16);
             HARNESS_RUN(h, contour, &args, harness_buffer(h, picture.keys, picture.count * 8),
-                        harness_buffer(h, picture.normal, picture.count * 16), color);
+                        harness_buffer(h, picture.normal, picture.count * 16), NULL, color);
             const float *got = harness_read(h, color);
             for (size_t k = 0; k < 4 * picture.count; k++)
                 if (picture.keys[k / 4] != REF_EMPTY_KEY && k % 4 < 3 &&
                     !(got[k] >= 0.0f && got[k] <= fmaxf(picture.color[k], 0.3f) * 1.001f))
                     harness_fail(h, "color", (int)(k / 4 % 67), (int)(k / 4 / 67), "got %.9g of %.9g", (double)got[k],
                                  (double)picture.color[k]);
+        }
+}
+
+// Values by a plane of slopes: across lines, between them, level at the height of one, unknown, of any size.
+static void values(struct harness *h)
+{
+    static const double sizes[] = {1.0, 1e-6, 1e6, 1e30};
+    for (size_t s = 0; s < 4; s++)
+        for (int p = 0; p < 2; p++) {
+            struct picture picture = effect_picture(h, 11 + s, 67, 45, p, PICTURE_SURFACES, p);
+            struct rng rng = {s};
+            struct contour_args args = args_of(&picture.view, (float)fmin(0.5 * sizes[s], 1e9), 1.0f + (float)s,
+                                               1 + (uint32_t)p);
+            float *slopes = harness_alloc(h, picture.count * 16);
+            args.of_values = 1;
+            for (size_t i = 0; i < picture.count; i++) {
+                const double rate = sizes[s] * exp2(-(double)rng_below(&rng, 30));
+                slopes[4 * i] = (float)(sizes[s] * ((double)rng_below(&rng, 100000) / 5000.0 - 10.0));
+                slopes[4 * i + 1] = (float)(rate * ((double)rng_below(&rng, 1000) / 500.0 - 1.0));
+                slopes[4 * i + 2] = (float)(rate * ((double)rng_below(&rng, 1000) / 500.0 - 1.0));
+                slopes[4 * i + 3] = 1.0f;
+                if (rng_below(&rng, 8) == 0) // level, at a line
+                    memcpy(slopes + 4 * i, (float[]){2.0f * args.interval[0], 0.0f, 0.0f, 1.0f}, 16);
+                if (rng_below(&rng, 8) == 0)
+                    memset(slopes + 4 * i, 0, 16);
+                if (s == 3) // as steep as slopes are
+                    slopes[4 * i + 1] = rng_below(&rng, 2) ? 1e18f : -1e18f;
+            }
+            effect_check_slopes(h, &contour, &args, sizeof args, &picture, slopes);
         }
 }
 
@@ -154,6 +183,7 @@ static void sanity(struct harness *h)
 
 int main(int argc, char **argv)
 {
-    static const struct harness_case cases[] = {{"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
+    static const struct harness_case cases[] = {
+        {"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}, {"values", values, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

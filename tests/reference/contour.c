@@ -51,10 +51,22 @@ struct ref_color ref_contour(const struct contour_args *args, const struct ref_p
     // each term of the rate is rounded a few times; where they cancel, their sum is off by more
     slope.rate_error = 24.0 * TOL_UNIT * (fabs(xs) + fabs(ys)) * (1.0 + fabs(turn)) * (1.0 + ref_length(ray)) / slope.rate;
     struct ref_vec cross = ref_vec(a.y * n.z - a.z * n.y, a.z * n.x - a.x * n.z, a.x * n.y - a.y * n.x);
+    if (args->of_values) {
+        const float *found = planes->slopes + 4 * pixel;
+        slope.along = found[0];
+        slope.along_error = 0.0;
+        slope.rate = fmax(hypot((double)found[1], (double)found[2]), 1e-15);
+        slope.rate_error = 8.0 * TOL_UNIT;
+    }
     double steep = ref_dot(n, n) < 0.5 ? 1.0 : ref_dot(cross, cross),
            share = (steep - (double)PT_CONTOUR_FLAT) * (double)PT_CONTOUR_RISE;
     double shown = args->opacity * fmin(fmax(share, 0.0), 1.0);
     double shown_error = share < 2.0 ? 16.0 * TOL_UNIT * (sqrt(steep) + steep) * (double)PT_CONTOUR_RISE : 4.0 * TOL_UNIT;
+    if (args->of_values) {
+        const double fading = 2.0 - args->interval[0] / slope.rate * (double)PT_CONTOUR_PER_APART;
+        shown = args->opacity * fmin(fmax(fading, 0.0), 1.0) * (double)planes->slopes[4 * pixel + 3];
+        shown_error = 32.0 * TOL_UNIT;
+    }
     double error, covered = lines(args, 0, &slope, &error);
     if (args->kinds > 1) {
         double bold_error, bold = lines(args, 1, &slope, &bold_error);

@@ -186,6 +186,7 @@ struct ref_planes {
     const float *offset; // of measured pixels
     const float *obscured;
     const float *albedo;     // colours without light
+    const float *slopes;     // NULL: none
     const uint32_t *shadows; // words, by light and id - id_base
 };
 
@@ -280,6 +281,20 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
                           const struct ref_planes *planes, int x, int y);
 // A whole phase; pixels: width x height, read as the state before it, left as the state after it. 0: out of memory.
 int ref_fill(const struct fill_args *args, const float *normal, const float *deff, const float *span, struct ref_pixel *pixels);
+
+// The value of a pixel: exact but for one rounding; known: 0: it is NaN. written: 0: it stays as it was.
+struct ref_value {
+    double value;
+    int known, written;
+};
+struct ref_value ref_value(const struct value_args *args, const struct ref_planes *planes, const float *scalars, int x, int y);
+// What values grow by around a pixel; unsure: float32 may take other pixels.
+struct ref_slope {
+    double value, x, y;
+    double value_error, x_error, y_error;
+    int known, unsure;
+};
+struct ref_slope ref_slope(const struct slope_args *args, const struct ref_planes *planes, const float *values, int x, int y);
 
 // Does the picture show the point `id` of the instance somewhere in its rectangle?
 int ref_mark(const struct mark_args *args, const struct ref_planes *planes, uint32_t id);

@@ -752,7 +752,17 @@ def test_colors_and_clips():
     rows = read_png("c.png")[3]
     assert rows[10][32][0] > 200 > 128 > rows[54][32][0], "by an attribute, brighter upwards"
     assert at("--color", "0.18,0.18,0.18", "--exposure", "1", "--contrast", "2") == at("--color", "0.72,0.72,0.72")
-    for arguments in (["--ramp", "nothing"], ["--ramp", "height", "--ramp-colors", "plaid"]):
+    along = ["--effect", "contour_source=attribute", "--contour", "600,2,1"]  # at 600, in the middle
+    at("--color", "1,1,1", "--attribute", "rise", *along)
+    rows = read_png("c.png")[3]
+    dark = [y for y in range(9, 55) if rows[y][32][0] < 100]
+    assert dark and all(abs(y - 31.5) < 2.5 for y in dark), f"lines along an attribute on rows {dark}"
+    drawn = read_png("c.png")
+    at("--ramp", "rise,-2,-1", "--ramp-colors", "grey", *along)
+    assert read_png("c.png")[3] == drawn[3], "along the ramp's attribute"
+    refused = run("render", "wall.csv", *view, "--ramp", "rise", "--attribute", "classification", *along, code=1).stderr
+    assert "both are of one attribute" in refused, refused
+    for arguments in (["--ramp", "nothing"], ["--ramp", "height", "--ramp-colors", "plaid"], ["--attribute", "nothing"]):
         assert "there is no" in run("render", "wall.csv", *view, *arguments, code=1).stderr
     for arguments in (["--contrast", "-1"], ["--hide-classes", "2,x"], ["--clip-box", "1,2,3"], ["--clip-tint", "1,0,0,0"],
                       ["--ramp", "height,1"], ["--exposure", "99"]):

@@ -264,6 +264,7 @@ static void take_steps(const struct tail *tail, struct walk *walk, const struct 
                                   .first = seen->first,
                                   .end = seen->end,
                                   .keys = tail->planes.keys + at,
+                                  .slopes = pt_walk_slopes(call, kernel->slopes, at),
                                   .z = seen->z};
         if (kernel->shading >= 0 && !tail->shade_count)
             row.shading = (const float *)pt_cpu_data(call, (uint32_t)kernel->shading) + 4 * at;

@@ -18,6 +18,7 @@ struct pt_here {
     vi x, y;                       // in the plane, or in the crop
     vf normal[3];                  // the one shown; buffer `shading`
     vf albedo[3];                  // buffer `albedo`
+    vf slope[4];                   // buffer `slopes`
     const struct clip_view *clips; // buffer `clips`
 };
 

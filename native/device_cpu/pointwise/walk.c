@@ -49,6 +49,8 @@ static inline __attribute__((always_inline)) void walk(const struct pt_walk_row 
             load3(row->shading, row->normal_rows, x, here.normal);
         if (kind.albedo >= 0)
             load3(row->albedo, row->albedo_rows, x, here.albedo);
+        if (kind.slopes >= 0 && row->slopes)
+            vf_load4(row->slopes + 4 * (size_t)x, here.slope);
         if (planar) {
             load3(NULL, (const float *const *)row->color_rows, x, color);
             color[3] = row->color_rows[3] ? vf_load(row->color_rows[3] + x) : one;
@@ -81,6 +83,7 @@ static inline __attribute__((always_inline)) struct pt_walk_row row_of(const str
     row.keys = kind.keys >= 0 ? (const uint64_t *)pt_cpu_data(call, (uint32_t)kind.keys) + at : NULL;
     row.shading = kind.shading >= 0 ? (const float *)pt_cpu_data(call, (uint32_t)kind.shading) + 4 * at : NULL;
     row.albedo = kind.albedo >= 0 ? (const float *)pt_cpu_data(call, (uint32_t)kind.albedo) + 4 * at : NULL;
+    row.slopes = pt_walk_slopes(call, kind.slopes, at);
     row.clips = kind.clips >= 0 ? pt_cpu_data(call, (uint32_t)kind.clips) : NULL;
     row.color = (float *)pt_cpu_data(call, (uint32_t)kind.color) + 4 * at;
     row.from = row.color;
