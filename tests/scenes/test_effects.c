@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Effects on whole pictures: regions and tiles equal crops, threads and batches change nothing, devices agree within the
-// table; depth, normals, source and keys stay as they are without effects; off is as it was.
+// table; depth, normals, source and keys stay as they are without effects; off is as it was. Effects that no row shows are shown as
+// the table of effects begins them.
 #include "staging.h"
 #include "tolerances.h"
 
@@ -9,18 +10,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct {
+struct show {
     const char *name;
     patina_effects effects;
     float noise; // largest difference of colours between devices; 0: TOL_COLOR of the brightest
-} shows[] = {
+};
+
+static const struct show rows[] = {
     {"eye-dome lighting", {.edl_strength = 1.0f}, 0.0f},
     {"eye-dome lighting, wide", {.edl_strength = 0.7f, .edl_radius = 16.0f}, 0.0f},
     {"obscurance", {.obscurance_strength = 1.0f}, 0.0f},
     {"obscurance and eye-dome lighting", {.obscurance_strength = 2.0f, .obscurance_radius = 0.5f, .edl_strength = 0.5f}, 0.0f},
     {"toon", {.toon_bands = 3, .toon_softness = 0.4f, .edl_strength = 1.0f}, 0.01f}, // an edge is 1/0.4 as steep as the light
     {"hatching", {.hatch_levels = 3, .hatch_ground = 0.5f}, 0.05f},                  // strokes' edges are a pixel wide
-    {"contour lines", {.contour_opacity = 1.0f, .contour_interval = 0.1f}, 0.05f},   // as strokes
     {"fog", {.fog_start = 2.0f, .fog_end = 4.0f, .fog_density = 0.9f, .fog_fixed = 1, .fog_color = {0.2f, 0.5f, 1.0f}}, 0.0f},
     {"depth of field", {.focus_aperture = 1.2f, .focus_distance = 2.2f}, 1e-3f}, // circles' rims are a pixel wide
     {"depth of field, wide", {.focus_aperture = 3.0f, .focus_distance = 2.4f}, 1e-3f},
@@ -40,14 +42,70 @@ static const struct {
       .paper_grain = 0.1f},
      0.05f},
 };
-enum { SHOWS = sizeof shows / sizeof shows[0] };
+enum { ROWS = sizeof rows / sizeof rows[0], MOST = 64, ALL = ROWS - 1 };
+
+static struct show shows[MOST];
+static uint32_t show_count;
+
+// Of effects in the table; of what is drawn the edges are a pixel wide, of a lens circles' rims.
+#define NOISE_CUES 0.0f
+#define NOISE_DRAWING 0.05f
+#define NOISE_CAMERA 1e-3f
+
+// A field as Blender begins it: of (start, low, usual, high) the first.
+#define FIRST(start, ...) start
+#define RED(r, g, b) (r)
+#define GREEN(r, g, b) (g)
+#define BLUE(r, g, b) (b)
+
+// Whether some row but the last, which has all, gives the field at this place a value.
+static int is_shown(size_t offset)
+{
+    static const char zero[4];
+    int shown = 0;
+    for (uint32_t i = 0; i + 1 < ROWS; i++)
+        shown |= memcmp((const char *)&rows[i].effects + offset, zero, sizeof zero) != 0;
+    return shown;
+}
+
+static void add_show(const struct show *show)
+{
+    assert_true(show_count < MOST);
+    shows[show_count++] = *show;
+}
+
+static void add_shows(void)
+{
+    struct show own = {0};
+    int shown = 1;
+    for (uint32_t i = 0; i < ROWS; i++)
+        add_show(&rows[i]);
+#define STRENGTH_OF(field, when) shown |= !strcmp(#when, "STRENGTH") && is_shown(offsetof(patina_effects, field));
+#define PATINA_EFFECT(id, label, panel, ...)                                                                                   \
+    if (!shown)                                                                                                                \
+        add_show(&own);                                                                                                        \
+    own = (struct show){.name = label, .noise = NOISE_##panel};                                                                \
+    shown = 0;
+#define PATINA_EFFECT_NUMBER(field, when, least, most, zero, unit, begun, ...)                                                 \
+    own.effects.field = (float)(FIRST begun);                                                                                  \
+    STRENGTH_OF(field, when)
+#define PATINA_EFFECT_COUNT(field, when, least, most, zero, unit, begun, ...)                                                  \
+    own.effects.field = (uint32_t)(FIRST begun);                                                                               \
+    STRENGTH_OF(field, when)
+#define PATINA_EFFECT_COLOR(field, when, zero, begun, ...)                                                                     \
+    memcpy(own.effects.field, (const float[]){(float)RED begun, (float)GREEN begun, (float)BLUE begun}, 12);                   \
+    STRENGTH_OF(field, when)
+#include "patina/effects.def"
+    if (!shown)
+        add_show(&own);
+}
 
 // A few of each kind: perspective, orthographic, lit, unlit, without normals, many clouds, glass, layers as passes.
 static const uint32_t chosen[] = {2, 5, 8, 10, 11, 18, 19, 20, 21};
 enum { CHOSEN = sizeof chosen / sizeof chosen[0], ONE_LAYERED = 5 };
 
 // Every show in the two smallest scenes, then a third of them, and all at once everywhere.
-static int pairs(uint32_t stage, uint32_t show) { return stage < 2 || show == SHOWS - 1 || (stage + show) % 3 == 0; }
+static int pairs(uint32_t stage, uint32_t show) { return stage < 2 || show == ALL || (stage + show) % 3 == 0; }
 
 static struct stage build(uint32_t stage, uint32_t show)
 {
@@ -78,8 +136,8 @@ static void test_regions(void **state)
         if (!strncmp(device_name, "cpu-", 4))
             continue; // levels differ in kernels only
         patina_device *device = support_device_open(device_name, 0, 0);
-        for (uint32_t s = 0; s < CHOSEN * SHOWS && device; s++) {
-            const uint32_t show = s % SHOWS, at = s / SHOWS;
+        for (uint32_t s = 0; s < CHOSEN * show_count && device; s++) {
+            const uint32_t show = s % show_count, at = s / show_count;
             if (!pairs(at, show) || (support_is_gl(device_name) && at))
                 continue;
             struct stage stage = build(at, show);
@@ -103,16 +161,16 @@ static void test_threads(void **state)
 {
     (void)state;
     static const uint32_t ways[][2] = {{1, 0}, {2, 0}, {3, 1}, {7, 2}};
-    for (uint32_t s = 0; s < CHOSEN * SHOWS; s++) {
-        if (!pairs(s / SHOWS, s % SHOWS))
+    for (uint32_t s = 0; s < CHOSEN * show_count; s++) {
+        if (!pairs(s / show_count, s % show_count))
             continue;
-        struct stage stage = build(s / SHOWS, s % SHOWS);
+        struct stage stage = build(s / show_count, s % show_count);
         struct picture truth = {0};
         for (uint32_t k = 0; k < sizeof ways / sizeof ways[0]; k++) {
             patina_device *device = support_device_open("cpu", ways[k][0], ways[k][1]);
             struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
             if (k) {
-                picture_assert_identical(&picture, &truth, 0, 0, shows[s % SHOWS].name);
+                picture_assert_identical(&picture, &truth, 0, 0, shows[s % show_count].name);
                 picture_free(&picture);
             } else {
                 truth = picture;
@@ -130,15 +188,15 @@ static void test_one_by_one(void **state)
 {
     (void)state;
     patina_device *device = support_device_open("cpu", 0, 0);
-    for (uint32_t s = 0; s < ONE_LAYERED * SHOWS; s++) {
-        struct stage stage = build(s / SHOWS, s % SHOWS);
+    for (uint32_t s = 0; s < ONE_LAYERED * show_count; s++) {
+        struct stage stage = build(s / show_count, s % show_count);
         stage.settings.layers = 1;
         stage.settings.layer_passes = 0;
         struct picture as_one = picture_render(device, stage.scene, &stage.camera, &stage.settings);
         stage.settings.layer_passes = 1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH | 1u << PATINA_PASS_NORMAL;
         struct picture apart = picture_render(device, stage.scene, &stage.camera, &stage.settings);
         apart.layers = 0; // the other has none to compare
-        picture_assert_identical(&as_one, &apart, 0, 0, shows[s % SHOWS].name);
+        picture_assert_identical(&as_one, &apart, 0, 0, shows[s % show_count].name);
         picture_free(&as_one);
         picture_free(&apart);
         stage_free(&stage);
@@ -153,8 +211,8 @@ static void test_passes_asked_for(void **state)
     static const uint32_t asked[] = {1u << PATINA_PASS_COMBINED, 1u << PATINA_PASS_DEPTH, 1u << PATINA_PASS_NORMAL,
                                      1u << PATINA_PASS_SOURCE, 1u << PATINA_PASS_DEPTH | 1u << PATINA_PASS_SHADOW};
     patina_device *device = support_device_open("cpu", 0, 0);
-    for (uint32_t s = 0; s < ONE_LAYERED * SHOWS; s++) {
-        struct stage stage = build(s / SHOWS, s % SHOWS);
+    for (uint32_t s = 0; s < ONE_LAYERED * show_count; s++) {
+        struct stage stage = build(s / show_count, s % show_count);
         stage.settings.layer_passes = 0;
         struct picture all = picture_render(device, stage.scene, &stage.camera, &stage.settings);
         const size_t size = (size_t)all.width * all.height * 4 * sizeof(float);
@@ -168,7 +226,8 @@ static void test_passes_asked_for(void **state)
             CHECK(patina_frame_render(frame, stage.scene), frame);
             CHECK(patina_frame_read(frame, PATINA_PASS_COMBINED, combined, size), frame);
             if (memcmp(combined, all.combined, size))
-                fail_msg("%s, stage %u: passes %#x alone change the picture", shows[s % SHOWS].name, s / SHOWS, asked[i]);
+                fail_msg("%s, stage %u: passes %#x alone change the picture", shows[s % show_count].name, s / show_count,
+                         asked[i]);
             patina_frame_destroy(frame);
         }
         free(combined);
@@ -197,15 +256,15 @@ static double brightest(const struct picture *picture)
 static void test_devices(void **state)
 {
     (void)state;
-    for (uint32_t s = 0; s < CHOSEN * SHOWS; s++) {
-        const uint32_t show = s % SHOWS;
-        if (!pairs(s / SHOWS, show))
+    for (uint32_t s = 0; s < CHOSEN * show_count; s++) {
+        const uint32_t show = s % show_count;
+        if (!pairs(s / show_count, show))
             continue;
-        struct stage stage = build(s / SHOWS, show);
+        struct stage stage = build(s / show_count, show);
         struct picture truth = {0};
         for (uint32_t k = 0; k < support_device_count(); k++) {
             const char *name = support_device_name(k);
-            if (support_is_gl(name) && s / SHOWS % 3 > 0 && show < SHOWS - 1)
+            if (support_is_gl(name) && s / show_count % 3 > 0 && show != ALL)
                 continue;
             patina_device *device = support_device_open(name, 0, 0);
             if (!device)
@@ -220,7 +279,7 @@ static void test_devices(void **state)
             double limit = shows[show].noise > 0.0f ? (double)shows[show].noise : TOL_COLOR * brightest(&truth);
             double off = worst(picture.combined, truth.combined, 4 * pixels);
             if (!(off <= limit) || memcmp(picture.keys, truth.keys, 8 * pixels) != 0)
-                support_die("%s, %s, %s: colours %.3g off, at most %.3g allowed", name, stagings[chosen[s / SHOWS]].name,
+                support_die("%s, %s, %s: colours %.3g off, at most %.3g allowed", name, stagings[chosen[s / show_count]].name,
                             shows[show].name, off, limit);
             picture_free(&picture);
         }
@@ -234,14 +293,14 @@ static void test_nothing_else_changes(void **state)
 {
     (void)state;
     patina_device *device = support_device_first();
-    for (uint32_t s = 0; s < CHOSEN * SHOWS; s++) {
-        if (!pairs(s / SHOWS, s % SHOWS))
+    for (uint32_t s = 0; s < CHOSEN * show_count; s++) {
+        if (!pairs(s / show_count, s % show_count))
             continue;
-        struct stage stage = build(s / SHOWS, s % SHOWS);
+        struct stage stage = build(s / show_count, s % show_count);
         struct picture with = picture_render(device, stage.scene, &stage.camera, &stage.settings);
         CHECK(patina_scene_set_effects(stage.scene, NULL), stage.scene);
         struct picture without = picture_render(device, stage.scene, &stage.camera, &stage.settings);
-        struct stage bare = stage_build(&stagings[chosen[s / SHOWS]]);
+        struct stage bare = stage_build(&stagings[chosen[s / show_count]]);
         struct picture never = picture_render(device, bare.scene, &bare.camera, &bare.settings);
         picture_assert_identical(&without, &never, 0, 0, "effects taken away");
         uint64_t pixels = (uint64_t)with.width * with.height;
@@ -249,7 +308,7 @@ static void test_nothing_else_changes(void **state)
         assert_true(worst(with.depth, without.depth, pixels) == 0.0 && worst(with.normal, without.normal, 3 * pixels) == 0.0);
         assert_true(worst(with.source, without.source, pixels) == 0.0);
         if (!(worst(with.combined, without.combined, 4 * pixels) > 0.01))
-            support_die("%s, %s: nothing to be seen", stagings[chosen[s / SHOWS]].name, shows[s % SHOWS].name);
+            support_die("%s, %s: nothing to be seen", stagings[chosen[s / show_count]].name, shows[s % show_count].name);
         for (uint64_t i = 0; i < 4 * pixels; i++)
             assert_true(isfinite(with.combined[i]));
         picture_free(&with);
@@ -261,48 +320,49 @@ static void test_nothing_else_changes(void **state)
     patina_device_destroy(device);
 }
 
+static void refuse(patina_scene *scene, const char *what, const patina_effects *wrong)
+{
+    patina_effects effects = *wrong;
+    assert_int_equal(patina_scene_set_effects(scene, &effects), PATINA_ERROR_ARGUMENT); // no struct_size
+    effects.struct_size = sizeof effects;
+    if (patina_scene_set_effects(scene, &effects) != PATINA_ERROR_ARGUMENT || !support_message(scene)[0])
+        support_die("%s: wrong effects were taken", what);
+}
+
+// What is beyond a field's range, as the table has it, and what does not go together.
 static void test_refusals(void **state)
 {
     (void)state;
-    const patina_effects wrong[] = {
-        {.edl_strength = -1.0f},
-        {.edl_strength = NAN},
-        {.edl_strength = 11.0f},
-        {.edl_radius = 17.0f},
-        {.edl_radius = 0.5f},
-        {.obscurance_strength = -1.0f},
-        {.obscurance_radius = -1.0f},
-        {.obscurance_radius = INFINITY},
-        {.toon_bands = 1},
-        {.toon_bands = 17},
-        {.toon_softness = 1.5f},
-        {.hatch_levels = 4},
-        {.hatch_spacing = 1.0f},
-        {.hatch_opacity = 2.0f},
-        {.hatch_color = {NAN}},
-        {.fog_density = 1.0f},
-        {.fog_density = 2.0f, .fog_end = 1.0f},
-        {.fog_fixed = 2},
-        {.paper_grain = -1.0f},
-        {.paper_color = {-1.0f}},
-        {.focus_aperture = 1.0f},
-        {.focus_aperture = -1.0f},
-    };
     patina_scene *scene = NULL;
     CHECK(patina_scene_create(&scene), NULL);
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        patina_effects effects = wrong[i];
-        assert_int_equal(patina_scene_set_effects(scene, &effects), PATINA_ERROR_ARGUMENT); // no struct_size
-        effects.struct_size = sizeof effects;
-        if (patina_scene_set_effects(scene, &effects) != PATINA_ERROR_ARGUMENT || !support_message(scene)[0])
-            support_die("wrong effects %u were taken", (unsigned)i);
-    }
+#define REFUSE(...) refuse(scene, #__VA_ARGS__, &(const patina_effects){__VA_ARGS__});
+#define PATINA_EFFECT_NUMBER(field, when, least, most, ...)                                                                    \
+    REFUSE(.field = NAN)                                                                                                       \
+    REFUSE(.field = INFINITY)                                                                                                  \
+    REFUSE(.field = (float)((most) > 0 ? 1.01 * (double)(most) : 1.0))                                                         \
+    REFUSE(.field = (float)((double)(least) > 0 ? 0.99 * (double)(least) : 1.01 * (double)(least)-0.01))
+#define PATINA_EFFECT_COUNT(field, when, least, most, ...)                                                                     \
+    REFUSE(.field = (most) + 1)                                                                                                \
+    if ((least) > 1)                                                                                                           \
+    REFUSE(.field = (least)-1)
+#define PATINA_EFFECT_COLOR(field, ...)                                                                                        \
+    REFUSE(.field = {NAN})                                                                                                     \
+    REFUSE(.field = {0.0f, -1.0f})                                                                                             \
+    REFUSE(.field = {0.0f, 0.0f, 1e5f})
+#define PATINA_EFFECT_AXIS(field, ...) REFUSE(.field = {0.0f, INFINITY}) REFUSE(.field = {NAN})
+#define PATINA_EFFECT_SWITCH(field, ...) REFUSE(.field = 2)
+#define PATINA_EFFECT_CHOICE(field, when, count, ...) REFUSE(.field = count)
+#include "patina/effects.def"
+    REFUSE(.fog_density = 1.0f) // fog_end is not beyond fog_start
+    REFUSE(.focus_aperture = 1.0f)
+    REFUSE(.exact = 2)
     patina_scene_destroy(scene);
 }
 
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
+    add_shows();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_regions),          cmocka_unit_test(test_threads),
         cmocka_unit_test(test_devices),          cmocka_unit_test(test_nothing_else_changes),

@@ -16,6 +16,10 @@ import traceback
 import zlib
 from pathlib import Path
 
+sys.dont_write_bytecode = True
+sys.path.append(str(Path(__file__).resolve().parents[2] / "build"))
+import effects as table  # noqa: E402
+
 PATINA = str(Path(sys.argv[1] if len(sys.argv) > 1 else "build/out/release/patina").resolve())
 FOLDER = Path()  # a temporary one, set by main
 
@@ -635,6 +639,12 @@ def test_effects():
                ("--hatch", "1,8,0.5,1,0.2,0,0"), ("--fog", "1,6"), ("--fog", "1,6,0.5,0.9,0.1,0.1"), ("--focus", "2,0.3"),
                ("--paper", "0.4"), ("--paper", "0.1,0.9,0.8,0.6"))
     seen = {}
+    for effect in table.read():  # those that no choice shows: as Blender begins them
+        if effect["panel"] != "CAMERA" and not any(choice[0] == f"--{effect['name']}" for choice in effects):
+            begun = {field["name"]: field["start"] for field in effect["fields"] if "start" in field}
+            effects += tuple(word for name, value in begun.items() for word in
+                             ("--effect", f"{name}={','.join(map(str, value)) if isinstance(value, tuple) else value}")),
+    assert any("contour_width=1" in choice for choice in effects)
     for choice in ((), *effects):
         run(*base, *choice)
         picture = (FOLDER / "effect.png").read_bytes()

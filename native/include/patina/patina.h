@@ -639,11 +639,10 @@ typedef struct patina_effects {
 #define PATINA_EFFECT_CHOICE(field, ...) uint32_t field;
 #include "effects.def"
 } patina_effects;
+// No effect. Zero is what effects.def says it stands for, but of colours, which exact makes black.
 #define PATINA_EFFECTS_INIT                                                                                                    \
     {                                                                                                                          \
-        .struct_size = sizeof(patina_effects), .exact = 1, .edl_radius = 1.4f, .hatch_spacing = 6.0f, .hatch_opacity = 1.0f,   \
-        .paper_color = {1.0f, 1.0f, 1.0f}, .contour_axis = {0.0f, 0.0f, 1.0f}, .contour_width = 1.0f, .contour_every = 5,      \
-        .contour_bold = 2.0f                                                                                                   \
+        .struct_size = sizeof(patina_effects), .exact = 1, .paper_color = { 1.0f, 1.0f, 1.0f }                                 \
     }
 
 enum patina_line_source { PATINA_LINE_FIXED = 0, PATINA_LINE_POINT = 1, PATINA_LINE_DEPTH = 2 };
