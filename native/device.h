@@ -53,6 +53,15 @@ struct pt_bound_pass {
     const void *arguments;
     struct pt_buffer **buffers;
     uint32_t buffer_count;
+    size_t argument_size;
+};
+
+// Passes that run as one, or a single one, of several that follow each other.
+struct pt_group {
+    const struct pt_bound_pass *passes;
+    uint32_t count;
+    float done; // the progress, once it is handed to the driver
+    double ms;  // out: that it took
 };
 
 struct pt_device_ops {
@@ -77,6 +86,10 @@ struct pt_device_ops {
     // NULL: all there are.
     uint32_t (*tail_length)(const struct pt_bound_pass *passes, uint32_t count);
     int (*run_tail)(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count);
+    // All of these at one go: the device is waited for once, and times are its own. cancel, progress: NULL: nobody asks. NULL where
+    // that is no faster than run, run_tail and wait in turn.
+    int (*run_groups)(struct patina_device *device, struct pt_group *groups, uint32_t count, const atomic_int *cancel,
+                      _Atomic float *progress);
     // Waits for all work (so that a clock means something).
     int (*wait)(struct patina_device *device);
     // Until the next call kernels call look(context) from time to time, from any of their threads; look NULL: no longer. NULL where a

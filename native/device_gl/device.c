@@ -58,6 +58,7 @@ static int close_context(struct pt_gl_device *d, void *unused)
         for (int i = 0; i < 2; i++)
             d->gl.DeleteProgram(d->tile_programs[i]);
         d->gl.DeleteTextures(PT_UNIT_COUNT, d->textures);
+        d->gl.DeleteQueries((GLsizei)d->query_count, d->queries);
         d->gl.DeleteBuffers(1, &d->arguments);
         d->gl.DeleteBuffers(1, &d->srgb);
         d->gl.Finish();
@@ -249,6 +250,98 @@ static int run_tail(struct pt_gl_device *d, void *context)
     return pt_gl_run_tail(d, f->passes, f->count);
 }
 
+// ---- several at one go ---------------------------------------------------------------------------------------------------
+
+struct groups_call {
+    struct pt_group *groups;
+    uint32_t count;
+    const atomic_int *cancel;
+    _Atomic float *progress;
+};
+
+static int run_group(struct pt_gl_device *d, const struct pt_group *group, const atomic_int *cancel)
+{
+    const struct pt_bound_pass *pass = group->passes;
+    if (group->count > 1)
+        return pt_gl_run_tail(d, pass, group->count);
+    return pt_gl_run(d, &(struct pt_gl_work){.kernel = pass->kernel,
+                                             .arguments = pass->arguments,
+                                             .argument_size = pass->argument_size,
+                                             .buffers = pass->buffers,
+                                             .cancel = cancel});
+}
+
+// Names of `count` timer queries; 0: there are none. Software has done its work when a call returns: it needs no timer.
+static int take_queries(struct pt_gl_device *d, uint32_t count)
+{
+    GLint bits = 0;
+    if (!d->base.info.hardware || !d->gl.QueryCounter || !d->gl.GetQueryObjectui64v)
+        return 0;
+    d->gl.GetQueryiv(GL_TIMESTAMP, GL_QUERY_COUNTER_BITS, &bits);
+    if (bits < 32)
+        return 0;
+    if (count > d->query_count) {
+        GLuint *grown = realloc(d->queries, count * sizeof *grown);
+        if (!grown)
+            return 0;
+        d->queries = grown;
+        d->gl.GenQueries((GLsizei)(count - d->query_count), d->queries + d->query_count);
+        d->query_count = count;
+    }
+    return 1;
+}
+
+// Waits for the device's work.
+static void read_queries(struct pt_gl_device *d, struct pt_group *groups, uint32_t count)
+{
+    GLuint64 before = 0, now = 0;
+    d->gl.GetQueryObjectui64v(d->queries[0], GL_QUERY_RESULT, &before);
+    for (uint32_t i = 0; i < count; i++, before = now) {
+        d->gl.GetQueryObjectui64v(d->queries[i + 1], GL_QUERY_RESULT, &now);
+        groups[i].ms = now > before ? (double)(now - before) * 1e-6 : 0.0;
+    }
+}
+
+static int run_groups(struct pt_gl_device *d, void *context)
+{
+    const struct groups_call *c = context;
+    const int timed = take_queries(d, c->count + 1);
+    double before = pt_milliseconds();
+    int result = PATINA_OK;
+    if (timed)
+        d->gl.QueryCounter(d->queries[0], GL_TIMESTAMP);
+    for (uint32_t i = 0; i < c->count && result == PATINA_OK; i++) {
+        if (c->cancel && atomic_load(c->cancel))
+            return PATINA_ERROR_CANCELLED;
+        result = run_group(d, &c->groups[i], c->cancel);
+        if (timed)
+            d->gl.QueryCounter(d->queries[i + 1], GL_TIMESTAMP);
+        else if (d->base.info.hardware)
+            d->gl.Finish();
+        const double now = pt_milliseconds();
+        c->groups[i].ms = now - before;
+        before = now;
+        if (c->progress)
+            atomic_store(c->progress, c->groups[i].done);
+    }
+    if (result != PATINA_OK)
+        return result;
+    if (timed)
+        read_queries(d, c->groups, c->count);
+    else
+        d->gl.Finish();
+    return pt_gl_check(d, "waiting for the device");
+}
+
+static int op_run_groups(struct patina_device *device, struct pt_group *groups, uint32_t count, const atomic_int *cancel,
+                         _Atomic float *progress)
+{
+    return call(device, run_groups,
+                &(struct groups_call){.groups = groups, .count = count, .cancel = cancel, .progress = progress});
+}
+
+// ---- operations, called --------------------------------------------------------------------------------------------------
+
 static int wait_for_work(struct pt_gl_device *d, void *unused)
 {
     (void)unused;
@@ -336,6 +429,7 @@ static void op_destroy(struct patina_device *device)
     pt_condition_destroy(&d->changed);
     pt_mutex_destroy(&d->lock);
     pt_handle_destroy(&device->handle);
+    free(d->queries);
     free(d);
 }
 
@@ -349,6 +443,7 @@ static const struct pt_device_ops ops = {
     .run = op_run,
     .tail_length = op_tail_length,
     .run_tail = op_run_tail,
+    .run_groups = op_run_groups,
     .wait = op_wait,
 };
 

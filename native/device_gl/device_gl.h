@@ -83,6 +83,8 @@ struct pt_gl_device {
     GLuint tile_programs[2];
     GLuint shown; // the key plane that PT_GL_SCRATCH_SHOWN is of, as long as no kernel writes planes; else 0
     GLuint textures[PT_UNIT_COUNT];
+    GLuint *queries; // timers, query_count of them
+    uint32_t query_count;
     struct pt_gl_tiles tiles;
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
 };

@@ -98,7 +98,7 @@ static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
     struct pt_buffer **buffers = calloc(refs, sizeof *buffers), **next = buffers;
     int error = bound && buffers ? PATINA_OK : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t i = 0; i < count && !error; i++) {
-        bound[i] = (struct pt_bound_pass){passes[i].kernel, NULL, next, passes[i].ref_count};
+        bound[i] = (struct pt_bound_pass){passes[i].kernel, NULL, next, passes[i].ref_count, passes[i].argument_size};
         error = arguments_of(e, first + i, &bound[i].arguments);
         for (uint32_t k = 0; k < passes[i].ref_count && !error; k++)
             error = bind_between(&e->binder, &passes[i].refs[k], next++);
@@ -129,15 +129,101 @@ static int run_some(struct pt_execution *e, uint32_t first, uint32_t count)
     return error ? error : pt_planes_poison(e->device, e->binder.planes, e->plan, when, 1);
 }
 
+// ---- or handed over at one go --------------------------------------------------------------------------------------------
+
+static uint32_t taken_at(const struct pt_execution *e, uint32_t i)
+{
+    const uint32_t some = pt_passes_together(e->device, &e->plan->passes[i]);
+    return some ? some : 1;
+}
+
+static const char *name_of(const struct pt_execution *e, uint32_t i, uint32_t taken)
+{
+    return taken > 1 ? "tail" : e->plan->passes[i].name;
+}
+
+// Passes from `first` on that need no decision between them: up to those that write the picture, or these.
+static uint32_t handed_over(const struct pt_execution *e, uint32_t first, uint32_t end)
+{
+    uint32_t i = first;
+    for (uint32_t taken; i < end && !e->writing; i += taken) {
+        taken = taken_at(e, i);
+        if (is_output(&e->plan->passes[i + taken - 1]))
+            break;
+    }
+    return e->writing ? end : i;
+}
+
+// What passes bind, and which of them run as one.
+static int bind_groups(struct pt_execution *e, uint32_t first, uint32_t end, struct pt_bound_pass *bound,
+                       struct pt_buffer **buffers, struct pt_group *groups, uint32_t *count)
+{
+    int error = PATINA_OK;
+    for (uint32_t i = first, taken; i < end && !error; i += taken) {
+        taken = taken_at(e, i);
+        groups[(*count)++] = (struct pt_group){.passes = bound,
+                                               .count = taken,
+                                               .done = e->progress_done +
+                                                       e->progress_share * (float)(i + taken) / (float)e->plan->pass_count};
+        for (uint32_t k = i; k < i + taken && !error; k++, bound++) {
+            const struct pt_pass *pass = &e->plan->passes[k];
+            *bound = (struct pt_bound_pass){pass->kernel, NULL, buffers, pass->ref_count, pass->argument_size};
+            error = arguments_of(e, k, &bound->arguments);
+            for (uint32_t r = 0; r < pass->ref_count && !error; r++, buffers++)
+                error = taken > 1 ? bind_between(&e->binder, &pass->refs[r], buffers)
+                                  : pt_bind(&e->binder, &pass->refs[r], buffers);
+        }
+    }
+    return error;
+}
+
+static int hand_over(struct pt_execution *e, uint32_t first, uint32_t end)
+{
+    uint32_t refs = 0, count = 0;
+    for (uint32_t i = first; i < end; i++)
+        refs += e->plan->passes[i].ref_count;
+    struct pt_bound_pass *bound = calloc(end - first, sizeof *bound);
+    struct pt_group *groups = calloc(end - first, sizeof *groups);
+    struct pt_buffer **buffers = calloc(refs + 1, sizeof *buffers);
+    int error = bound && groups && buffers ? bind_groups(e, first, end, bound, buffers, groups, &count)
+                                           : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    if (!error)
+        error = e->device->ops->run_groups(e->device, groups, count, e->writing ? NULL : e->cancel, e->progress);
+    for (uint32_t g = 0, i = first; g < count && !error; i += groups[g++].count)
+        pt_note_time(e->times, name_of(e, i, groups[g].count), groups[g].ms);
+    free(bound);
+    free(groups);
+    free(buffers);
+    return error;
+}
+
+static int run_handed_over(struct pt_execution *e, uint32_t first, uint32_t end)
+{
+    int error = PATINA_OK;
+    for (uint32_t to; first < end && !error; first = to) {
+        to = handed_over(e, first, end);
+        if (to == first) {
+            if (e->cancel && atomic_load(e->cancel))
+                return PATINA_ERROR_CANCELLED;
+            error = pt_planes_ensure_picture(e->device, e->binder.planes, e->plan);
+            e->writing = 1;
+            to = end;
+        }
+        error = error ? error : hand_over(e, first, to);
+    }
+    return error;
+}
+
 int pt_run_passes(struct pt_execution *e, uint32_t first, uint32_t count)
 {
+    if (e->device->ops->run_groups && !e->merge && !e->binder.planes->poisoned)
+        return run_handed_over(e, first, first + count);
     const uint32_t end = first + count;
     double before = pt_milliseconds();
     int error = PATINA_OK;
     for (uint32_t i = first; i < end && !error;) {
-        const struct pt_pass *pass = &e->plan->passes[i];
-        const uint32_t some = pt_passes_together(e->device, pass), taken = some ? some : 1;
-        const char *name = taken > 1 ? "tail" : pass->name;
+        const uint32_t taken = taken_at(e, i);
+        const char *name = name_of(e, i, taken);
         error = run_some(e, i, taken);
         i += taken;
         if (error)
