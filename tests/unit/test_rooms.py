@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""build/check_rooms says what it is there to say: on a copy of the sources as they are, nothing; of each thing that must not be, where
+it is."""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+READER = "addon/sync/attributes.py"  # of Blender's memory
+
+
+class Rooms(unittest.TestCase):
+    def setUp(self) -> None:
+        made = tempfile.TemporaryDirectory()
+        self.addCleanup(made.cleanup)
+        self.folder = Path(made.name)
+        for name in ("native", "shaders", "addon"):
+            shutil.copytree(ROOT / name, self.folder / name, ignore=shutil.ignore_patterns("glad", "__pycache__", "presets"))
+        (self.folder / "build").mkdir()
+        shutil.copy(ROOT / "build/check_rooms", self.folder / "build")
+
+    def check(self) -> tuple[int, str]:
+        done = subprocess.run([sys.executable, self.folder / "build/check_rooms"], capture_output=True, text=True, check=False)
+        return done.returncode, done.stdout + done.stderr
+
+    def refuses(self, name: str, line: str, *said: str) -> None:
+        """With this line at the file's end it fails and says all of `said`; without it, no more."""
+        path = self.folder / name
+        before = path.read_bytes()
+        path.write_bytes(before + b"\n" + line.encode() + b"\n")
+        code, text = self.check()
+        self.assertEqual(code, 1, f"{name}: {line!r} was taken: {text}")
+        for word in said:
+            self.assertIn(word, text)
+        path.write_bytes(before)
+        self.assertEqual(self.check()[0], 0)
+
+    def test_nothing_is_wrong(self) -> None:
+        code, text = self.check()
+        self.assertEqual(code, 0, text)
+        self.assertIn("0 wrong", text)
+
+    def test_memory_is_read_in_one_file(self) -> None:
+        lines = ("import ctypes", "from ctypes import string_at", "values = np.ctypeslib.as_array(pointer, (3,))",
+                 "word = c_float.from_address(mesh.as_pointer())", "seen = numpy.array(Holder(__array_interface__=told))",
+                 "words = (c_int * 4).from_buffer(layer)")
+        for line in lines:
+            self.refuses("addon/sync/clouds.py", line, "addon/sync/clouds.py:", "memory by its address", READER)
+        number = len((self.folder / "addon/viewport.py").read_text(encoding="utf-8").splitlines()) + 2
+        self.refuses("addon/viewport.py", "import ctypes", f"addon/viewport.py:{number}:")
+        for name in (READER, "addon/native/__init__.py"):
+            path = self.folder / name
+            path.write_text(path.read_text(encoding="utf-8") + "\nimport ctypes\n", encoding="utf-8")
+            self.assertEqual(self.check()[0], 0, f"{name} may")
+
+    def test_rooms_and_circles(self) -> None:
+        self.refuses("native/plan/effects.c", '#include "run/frame.h"', "plan may not know run")
+        self.refuses("native/scene/cloud.c", "#include <pthread.h>", "operating system")
+        self.refuses("native/plan/plan.h", '#include "passes.h"', "a circle")
+
+
+if __name__ == "__main__":
+    unittest.main()
