@@ -57,6 +57,11 @@ static inline struct pt_ref pt_span_of(const struct pt_plan *plan)
 {
     return pt_plane_at(plan->sigmas ? PT_PLANE_SPAN : PT_PLANE_DEFF, 0);
 }
+// Whether layer distances of the instance's points go by how thick their surface is.
+static inline int pt_has_sigmas(const struct pt_plan *plan, const struct pt_plan_instance *instance)
+{
+    return plan->sigmas && instance->instance->cloud->shapes != NULL;
+}
 // Of an analysed cloud: its shape words. They lie where radii would, unless it has its own.
 static inline struct pt_ref pt_shapes_of(const struct pt_plan_instance *instance, uint32_t i)
 {
@@ -164,6 +169,8 @@ void pt_plan_blend_light(struct pt_builder *builder);    // once shadow words ar
 void pt_plan_ranges(struct pt_builder *builder);
 void pt_plan_reveal(struct pt_builder *builder); // beside pt_plan_assess: how far their scans lie apart
 
+// filling.c: levels and what closes holes at each.
+void pt_plan_filling(struct pt_builder *builder);
 // average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.
 void pt_plan_average(struct pt_builder *builder);
 int pt_averages(const struct pt_builder *builder, const struct pt_plan_instance *instance);

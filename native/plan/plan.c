@@ -4,7 +4,6 @@
 
 #include "expected.h"
 #include "lines.h"
-#include "shared/filling.h"
 #include "shared/measured.h"
 #include "shared/points.h"
 #include "shared/shadows.h"
@@ -58,11 +57,6 @@ static void plan_scatter(struct pt_builder *builder)
                   (unsigned long long)chunks, args.instances);
 }
 
-static int has_sigmas(const struct pt_plan *plan, const struct pt_plan_instance *instance)
-{
-    return plan->sigmas && instance->instance->cloud->shapes != NULL;
-}
-
 // Discs behind each other that are one surface, where layers are told apart. Without normals discs face the picture: along a slope
 // of s they lie up to s radii before and behind it, 2 radii / |n.v| in all. In its own pixel a disc that its centre's ray misses
 // lies where its point does: of a slope, up to 0.71 pixels before it or behind.
@@ -93,7 +87,7 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
                   "instance %u has no normals: estimated from the depth of at most %u x %u pixels", i, 2 * args.radius + 1,
                   2 * args.radius + 1);
     }
-    const int thick = has_sigmas(plan, instance);
+    const int thick = pt_has_sigmas(plan, instance);
     struct surface_args args = {.view = pt_view_of(plan, instance, 0),
                                 .instance = instance->args,
                                 .sigma_scale = thick ? pt_sigma_scale(builder->scene) : 0.0f,
@@ -105,119 +99,6 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
                       pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0), thick ? pt_shapes_of(instance, i) : pt_nothing(),
                       pt_plane_if(plan->sigmas, PT_PLANE_SPAN, 0)}),
               "layer distance%s and normal of instance %u's pixels", thick ? " by sigma" : "", i);
-}
-
-// What no pixel's layer distance is below, whatever the rounding; world units.
-static float least_distance(const struct pt_plan *plan)
-{
-    float least = plan->triangles ? 0.0f : INFINITY; // a mesh has but its footprint
-    for (uint32_t i = 0; i < plan->instance_count; i++) {
-        const struct instance_args *args = &plan->instances[i].args;
-        const patina_cloud_info *info = &plan->instances[i].instance->cloud->info;
-        int known = info->spacing_min > 0.0 && isfinite(info->spacing_max); // no chunk is of class 0
-        const float spacings = has_sigmas(plan, &plan->instances[i]) ? PT_SPACING_SURE : PT_SPACING_FACTOR;
-        least = fminf(least, fmaxf(args->d_min, spacings * args->spacing[known]));
-    }
-    return 0.999f * least;
-}
-
-// What share of a pixel's footprint at a level no layer distance is below, whatever the rounding.
-static float least_share(const struct pt_plan *plan, uint32_t level)
-{
-    return 0.999f * (plan->sigmas && !level ? PT_FOOTPRINT_SURE : 1.0f);
-}
-
-// How far an analysed cloud's points close holes beside them, in d_eff (two spacings); discs cover what is theirs already. With
-// discs as far as points, virtual scans show a tenth more of false surface, and a torus of 62,500 points 1 dB less.
-#define REACH 1.0f
-#define DISC_REACH 0.35f
-
-static void plan_fill_level(struct pt_builder *builder, uint32_t level)
-{
-    struct pt_plan *plan = builder->plan;
-    struct fill_args args = {.view = pt_view_at(plan, level),
-                             .phases = PT_FILL_BACKGROUND | (level && plan->discs_count ? 0 : PT_FILL_OCCLUDED),
-                             .iterations = plan->iterations,
-                             .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
-                             .refined = plan->quality == PATINA_QUALITY_REFINED,
-                             .least = least_distance(plan),
-                             .least_share = least_share(plan, level),
-                             .from_width = plan->view.width,
-                             .alone = !level && plan->fill == PATINA_FILL_CLOSED};
-    if (plan->reaches) {
-        args.reach = REACH;
-        args.disc_reach = DISC_REACH;
-        args.discs_first = plan->discs_first;
-    }
-    PT_REASON(PT_ADD(builder, fill, args,
-                     {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
-                      pt_plane_at(PT_PLANE_DEFF, 0), pt_span_of(plan)}),
-              "level %u: %u fills, at most %u un-fills of background, then of occluded pixels", level, args.iterations,
-              args.unfills);
-}
-
-static void plan_pyramid(struct pt_builder *builder)
-{
-    struct pt_plan *plan = builder->plan;
-    for (uint32_t level = 1; level <= plan->levels; level++) {
-        struct view_args fine = pt_view_at(plan, level - 1);
-        struct pull_args args = {.view = pt_view_at(plan, level), .fine_width = fine.width, .fine_height = fine.height};
-        // whole rows, and some past the rectangle: filters look one past it, at this level and at coarser ones
-        const uint32_t more = 2u << (plan->levels - level);
-        uint32_t *rect = args.view.rect;
-        rect[0] = 0;
-        rect[1] = rect[1] > more ? rect[1] - more : 0;
-        rect[2] = args.view.width;
-        rect[3] = rect[3] + more < args.view.height ? rect[3] + more : args.view.height;
-        PT_REASON(PT_ADD(builder, pull, args,
-                         {pt_keys_of(builder, level - 1), pt_from_of(builder, level - 1), pt_keys_of(builder, level),
-                          pt_from_of(builder, level)}),
-                  "spacing %.2f pixels: holes are closed at coarser levels first", plan->spacing_px);
-    }
-    for (uint32_t level = plan->levels; level > 0; level--) {
-        plan_fill_level(builder, level);
-        struct view_args coarse = pt_view_at(plan, level);
-        struct push_args args = {.view = pt_view_at(plan, level - 1),
-                                 .coarse_width = coarse.width,
-                                 .coarse_height = coarse.height,
-                                 .refined = plan->quality == PATINA_QUALITY_REFINED,
-                                 .least = least_distance(plan),
-                                 .least_share = least_share(plan, level - 1),
-                                 .background = plan->discs_count > 0,
-                                 .from_width = plan->view.width};
-        PT_REASON(PT_ADD(builder, push, args,
-                         {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),
-                          pt_from_of(builder, level - 1), pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0),
-                          pt_span_of(plan)}),
-                  "level %u to level %u", level, level - 1);
-    }
-}
-
-static void plan_filling(struct pt_builder *builder)
-{
-    struct pt_plan *plan = builder->plan;
-    if (!plan->iterations) {
-        pt_skip(builder, "fill",
-                builder->scene->settings.surface == PATINA_SURFACE_SPLATS ? "the settings ask for discs"
-                : plan->means == PT_MEANS_RANGES                          ? "all clouds in view are range images"
-                : builder->scene->settings.error_target > 0.0f            ? "the error target is met without"
-                                                                          : "switched off in the settings");
-        pt_skip(builder, "pull", "no filling");
-        pt_skip(builder, "push", "no filling");
-        return;
-    }
-    if (plan->levels) {
-        plan_pyramid(builder);
-    } else {
-        char reason[96];
-        snprintf(reason, sizeof reason,
-                 plan->fill == PATINA_FILL_PAPER ? "filling as in the paper has one level"
-                                                 : "spacing %.2f pixels needs no coarser level",
-                 plan->spacing_px);
-        pt_skip(builder, "pull", reason);
-        pt_skip(builder, "push", reason);
-    }
-    plan_fill_level(builder, 0);
 }
 
 // color: COLOR_A, or UNLIT for the points' own colours.
@@ -562,7 +443,7 @@ static void plan_surfaces(struct pt_builder *builder)
     plan_measured(builder);
     if (builder->plan->reopens == 2) {
         const int behind = builder->behind;
-        plan_filling(builder);
+        pt_plan_filling(builder);
         if (!pt_plan_reopen_find(builder)) {
             pt_plan_reopen_take(builder); // says why not
             return;
@@ -572,7 +453,7 @@ static void plan_surfaces(struct pt_builder *builder)
         builder->behind = behind;
     }
     pt_plan_reopen_keep(builder);
-    plan_filling(builder);
+    pt_plan_filling(builder);
     builder->again = 0;
     pt_plan_reopen_take(builder);
 }

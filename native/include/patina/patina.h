@@ -303,86 +303,6 @@ PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
 PATINA_API int patina_cloud_verify(const char *path, patina_progress *progress);
 PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info);
 
-// ---- files -----------------------------------------------------------------------------------------------------
-
-typedef struct patina_file_info {
-    size_t struct_size;
-    char format[48];        // "PLY binary_little_endian", ...
-    uint64_t count;         // points
-    uint32_t attributes;    // scalar attributes beside position, normal, colour
-    uint32_t position_type; // patina_type as stored in the file
-    uint32_t color_type;    // PATINA_NONE without colour
-    uint32_t has_normals;
-    double origin[3];              // float64 origin that positions are relative to; 0 unless float32 would lose detail
-    double box_min[3], box_max[3]; // of all finite positions, origin included
-    uint64_t invalid_positions;
-    uint32_t stations; // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
-    uint32_t scans;    // that the file tells of: patina_file_get_scan; 0: none
-    uint32_t splats;   // 1: Gaussian splats, taken as discs: attributes "opacity", 0..1, and "radius", of patina_cloud_desc
-    uint32_t unused;   // says nothing
-} patina_file_info;
-
-typedef struct patina_file_attribute {
-    size_t struct_size;
-    char name[64];
-    uint32_t type; // as in the file
-} patina_file_attribute;
-
-// A scan of a file. The file's coordinates, origin included, and its unit.
-typedef struct patina_file_scan {
-    size_t struct_size;
-    char name[64];          // of its own file, where a .conf names that; else ""
-    uint64_t first, count;  // its points follow each other; attribute "scan" says its index
-    uint32_t columns, rows; // of the scanner's grid; 0: none
-    double pose[12];        // the file's coordinates from the scan's own: three rows of four
-    double station[3];      // where the scanner stood, if has_station
-    double direction[3];    // in which it looked, unit; 0 0 0 = not known, or all around: points more than 60 degrees beside it
-    double interval;        // between neighbouring samples: the median way in the grid; 0 = not known
-    uint32_t has_station;
-    uint32_t unused;
-} patina_file_scan;
-
-// Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS, PTX or conf file whole; formats are told apart by content. Errors name
-// the byte offset (binary) or line (text). Points of a scanner's grid (PTX, range_grid of a PLY) have the attributes "row" and
-// "column", those of a PTX and a conf "scan" too; PLYs that the add-on writes say what is known of their scans. A PLY's faces, and a
-// scanner's grid, give normals where there are no others.
-// A conf (Stanford's: lines "bmesh NAME tx ty tz qx qy qz qw") is the files that it names, each in its place, p' = R(conjugate of q) p
-// + t. Scans that cannot be read or placed are left out, and a line of the log names them: of a conf and of a PTX.
-PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
-PATINA_API int patina_file_open_memory(const void *data, size_t size, patina_file **out); // data is not kept
-PATINA_API void patina_file_destroy(patina_file *file);
-PATINA_API int patina_file_get_info(const patina_file *file, patina_file_info *info);
-PATINA_API int patina_file_get_attribute(const patina_file *file, uint32_t index, patina_file_attribute *attribute);
-PATINA_API int patina_file_get_scan(const patina_file *file, uint32_t index, patina_file_scan *scan);
-// Copies one column as float32 (uint8 for colour) into the caller's buffer of `size` bytes.
-PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, size_t size); // relative to origin
-PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, size_t size);
-PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size); // sRGB
-PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);  // linear
-PATINA_API int patina_file_read_stations(const patina_file *file, double *xyz,
-                                         size_t size); // file coordinates: origin included
-PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
-// A scanner's grid, of one scan: which column and row each point lies in, and where the scanner stood, in the positions'
-// coordinates.
-typedef struct patina_grid_desc {
-    size_t struct_size;
-    uint64_t count;
-    const float *position; // 3 a point
-    const uint32_t *column, *row;
-    double station[3];
-} patina_grid_desc;
-// Normals as patina_file_open finds them in grids, towards the scanner, 3 a point into `normals`; 0 0 0 where a point lies in no
-// surface, and everywhere where the grid is nearly empty.
-PATINA_API int patina_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals);
-// Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
-// gives it classes. One of splats has their opacities and radii.
-PATINA_API int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out);
-// Open + build in one call.
-PATINA_API int patina_cloud_load(const char *path, patina_progress *progress, patina_cloud **out);
-// Writes a binary little-endian PLY; columns as in the descriptor (positions are written as float64 when the
-// descriptor has an origin, else in their own type).
-PATINA_API int patina_write_ply(const char *path, const patina_cloud_desc *desc);
-
 // ---- scene -----------------------------------------------------------------------------------------------------
 
 enum patina_lighting { PATINA_LIGHTING_AUTO = 0, PATINA_LIGHTING_UNLIT = 1, PATINA_LIGHTING_LIT = 2 };
@@ -855,6 +775,7 @@ PATINA_API int patina_panorama_join_keys(const patina_panorama *panorama, const 
 #endif
 
 // The rest of the manual, which this header includes.
+#include "files.h"
 #include "meshes.h"
 #include "parts.h"
 #include "points.h"

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of points on the command line: tests that test_cli.py, the script that runs, takes in."""
+
+import random
+
+import __main__ as cli
+
+
+def test_tables_of_spreadsheets():
+    """Decimals behind a comma, as half of Europe writes them, are no columns of their own."""
+    (cli.FOLDER / "comma.csv").write_text("X;Y;Z\n2,051640;0,143959;-0,918971\n1,5;1;0\n")
+    said = cli.run("info", "comma.csv").stdout
+    assert "2.05164" in said and "1.5" in said and "column" not in said, said
+    (cli.FOLDER / "lonlat.csv").write_text("id,lon,lat,elev\n1,2,3,4\n")
+    assert "no columns x, y and z in its line of names: id, lon, lat, elev" in cli.run("info", "lonlat.csv", code=1).stderr
+
+
+def test_missing_and_broken_files():
+    (cli.FOLDER / "broken.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                                           "property float y\nproperty float z\nend_header\n1 2 3\n4 five 6\n7 8 9\n")
+    for arguments in (["info"], ["render", "-o", "x.png"], ["convert", "x.ply"]):
+        for name in ("nothing.ply", "broken.ply"):
+            done = cli.run(arguments[0], name, *arguments[1:], code=1)
+            assert name in done.stderr and not done.stdout, done.stderr
+    assert "line" in cli.run("info", "broken.ply", code=1).stderr
+    assert not (cli.FOLDER / "x.png").exists() and not (cli.FOLDER / "x.ply").exists()
+
+
+def test_formats_of_the_add_on():
+    """Files that only the add-on reads are told as such, not as broken ones."""
+    for name, head, word in (("a.las", b"LASF" + bytes(300), "LAS, LAZ or COPC"), ("a.e57", b"ASTM-E57" + bytes(100), "E57"),
+                             ("a.pcd", b"# .PCD v0.7\nVERSION 0.7\n", "PCD")):
+        (cli.FOLDER / name).write_bytes(head)
+        for arguments in (("info", name), ("render", name, "-o", "x.png"), ("convert", name, "x.ply")):
+            error = cli.run(*arguments, code=1).stderr
+            assert f"{name}: a file of format {word}, which Patina's add-on for Blender reads" in error, error
+
+
+def test_bytes_too_many_are_told():
+    (cli.FOLDER / "long.ply").write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                          b"property float z\nend_header\n" + bytes(12 + 7))
+    for arguments in (("info", "long.ply"), ("render", "long.ply", "-o", "x.png"), ("convert", "long.ply", "x.ply")):
+        assert "warning: long.ply: 7 bytes follow behind byte" in cli.run(*arguments).stderr, arguments
+
+
+def test_unwritable_output():
+    cli.ball("unwritable.ply", 100)
+    assert "no/such" in cli.run("render", "unwritable.ply", "-o", "no/such/x.png", code=1).stderr
+    cli.run("convert", "unwritable.ply", "no/such/x.ply", code=1)
+
+
+def test_info():
+    text = cli.run("info", cli.ball("info.ply", 5000)).stdout
+    lines = {line.split()[0]: line.split()[1:] for line in text.splitlines() if line.strip() and line[0] != " "}
+    assert lines["points"] == ["5000"] and lines["format"] == ["PLY", "ascii"] and lines["normals"] == ["yes"]
+    assert lines["colours"] == ["no"]
+    assert 0.01 < float(lines["spacing"][0]) < 0.2  # sqrt(4 pi / 5000) = 0.05
+
+
+def test_info_tells_scans():
+    """Of a .conf each scan with its file, points, interval and direction; it renders and converts as one cloud."""
+    grid = "".join(f"{u * 0.1} {v * 0.1} 2\n" for v in range(4) for u in range(5)) + "".join(f"1 {i}\n" for i in range(20))
+    head = ("ply\nformat ascii 1.0\nobj_info num_cols 5\nobj_info num_rows 4\nelement vertex 20\nproperty float x\nproperty float y\n"
+            "property float z\nelement range_grid 20\nproperty list uchar int vertex_indices\nend_header\n")
+    (cli.FOLDER / "front.ply").write_text(head + grid)
+    (cli.FOLDER / "both.conf").write_text("mesh whole_cybcyl 0 0 0 0 0 0 1\nbmesh front.ply 0 0 0 0 0 0 1\nbmesh lost.ply 0 0 0 0 0 0 1\n"
+                                      "bmesh front.ply 9 0 0 0 0.70710678 0 0.70710678\n")
+    done = cli.run("info", "both.conf")
+    assert "scan 0      front.ply, 20 points, grid 5 x 4, interval 0.1, looking 0.000 0.000 -1.000" in done.stdout.replace("-0.000", "0.000")
+    assert "scan 1      front.ply, 20 points, grid 5 x 4, interval 0.1, looking 1.000" in done.stdout, done.stdout
+    assert "scan lost.ply is left out" in done.stderr and "mesh whole_cybcyl is left out" in done.stderr, done.stderr
+    cli.run("convert", "both.conf", "both.ply")
+    assert "points      40" in cli.run("info", "both.ply").stdout
+    cli.run("render", "both.conf", "-o", "both.png", "--size", "32x32")
+
+
+def test_info_of_an_empty_cloud():
+    assert "points      0" in cli.run("info", cli.write_ply("empty.ply", [])).stdout
+
+
+def test_convert_keeps_the_cloud():
+    generator = random.Random(1)
+    colors = [tuple(generator.randrange(256) for _ in range(3)) for _ in range(3000)]
+    cli.ball("ascii.ply", 3000, colors=colors)
+    cli.run("convert", "ascii.ply", "binary.ply")
+    before, after = cli.run("info", "ascii.ply").stdout.splitlines(), cli.run("info", "binary.ply").stdout.splitlines()
+    assert after[0].endswith("binary_little_endian") and before[1:] == after[1:]
+    for name in ("ascii", "binary"):
+        cli.run("render", f"{name}.ply", "-o", f"{name}.png", "--size", "100x80")
+    assert (cli.FOLDER / "ascii.png").read_bytes() == (cli.FOLDER / "binary.png").read_bytes()
+
+
+def test_convert_keeps_a_survey_origin():
+    cli.ball("survey.ply", 2000, (451234.5, 5012345.25, 1200), "double")
+    cli.run("convert", "survey.ply", "survey2.ply")
+    a, b = cli.run("info", "survey.ply").stdout.splitlines(), cli.run("info", "survey2.ply").stdout.splitlines()
+    assert [line for line in a if line.startswith("origin")]
+    same = ("points", "box", "size", "normals")
+    assert [line for line in a if line.startswith(same)] == [line for line in b if line.startswith(same)]
+
+
+# ---- pictures ------------------------------------------------------------------------------------------------------
