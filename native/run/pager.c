@@ -8,6 +8,7 @@
 
 enum {
     SHARE = 3,        // of the free memory
+    LEAST = 64 << 20, // bytes, however little is free: less would be read over and over
     ROUNDS_A_CAP = 2, // the last round's pages and this one's
     FULL_EIGHTHS = 7, // from here on all is given back: threads read on meanwhile
     // To look takes 2 to 5 microseconds. Of a file that lies in the system's memory threads take up to 50 GB a second: no more than an
@@ -34,11 +35,19 @@ static uint64_t mapped_bytes(const struct patina_scene *scene)
     return bytes;
 }
 
+static uint64_t share_of_free(void)
+{
+    const uint64_t free_bytes = pt_free_memory(), share = free_bytes / SHARE;
+    return !free_bytes ? UINT64_MAX : share < LEAST ? LEAST : share; // where nobody knows, all may be held
+}
+
+// 0: all of it fits.
 static uint64_t cap_for(const struct patina_device *device, uint64_t mapped, uint64_t *round)
 {
-    const uint64_t cap = !mapped || !device->ops->watch ? 0
-                         : device->mapped_cap           ? device->mapped_cap
-                                                        : pt_free_memory() / SHARE;
+    *round = 0;
+    if (!mapped || !device->ops->watch)
+        return 0;
+    const uint64_t cap = device->mapped_cap ? device->mapped_cap : share_of_free();
     *round = cap / ROUNDS_A_CAP;
     return mapped > cap ? cap : 0;
 }

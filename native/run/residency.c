@@ -83,7 +83,11 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
             return error;
     }
     int error = upload_shapes(device, cloud, resident);
-    return error ? error : upload_colors(device, cloud, resident);
+    if (!error)
+        error = upload_colors(device, cloud, resident);
+    if (!resident->buffers[PT_POSITIONS].wrapped) // a copy: the file itself need not be held beside it
+        pt_cloud_return(cloud);
+    return error;
 }
 
 // What changed since it was uploaded.

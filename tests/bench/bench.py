@@ -17,7 +17,8 @@ of them, in the same order; "absent" what could not be measured, and why.
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
 scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
-(ten minutes of work in Blender), analysis (what every point knows, 10 million), walk (frame by frame
+(ten minutes of work in Blender), analysis (what every point knows, 10 million), files (a town of 100 million points under a cap, 2.7 GB
+on the disk), walk (frame by frame
 through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs), soft (soft points in the sizes
 of [S Table 1], and against OSPRay), platforms (Blender's start with the add-on, sizes of packages, instructions of NEON's inner
 loops). With --quick they take a million points, and one
@@ -39,6 +40,7 @@ from typing import Any
 
 import analysis
 import case as cases
+import files
 import imports
 import instructions
 import machine
@@ -66,7 +68,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "scans", "independent", "session", "analysis", "walk", "ranges", "soft", "platforms", "graphics", "scaling")
+          "leaves", "scans", "independent", "session", "analysis", "files", "walk", "ranges", "soft", "platforms", "graphics", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -226,6 +228,7 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
     "leaves": ("leaves", "Specks of shadows", lambda options: quoted.leaves(options.library)),
     "analysis": ("analysis", "What every point knows",
                  lambda options: analysis.times(1_000_000 if options.quick else 10_000_000, options.library)),
+    "files": ("files", "Clouds larger than memory", lambda options: files.measure((1,) if options.quick else (3, 10), options.library)),
     "normals": ("analysis", "Normals of known shapes", lambda options: analysis.normals(options.library)),
     "walk": ("walk", "Walks through virtual scans", lambda options: walk.text(options.quick, options.library)),
     "start": ("platforms", "Blender's start, and the packages", lambda options: start.measure(3 if options.quick else 9)),
