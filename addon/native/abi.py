@@ -104,28 +104,6 @@ class Neighbourhoods(Descriptor):
                 ("distances", c_void_p), ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
 
 
-class FileInfo(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
-                ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32), ("origin", c_double * 3),
-                ("box_min", c_double * 3), ("box_max", c_double * 3), ("invalid_positions", c_uint64),
-                ("stations", c_uint32), ("scans", c_uint32), ("splats", c_uint32), ("unused", c_uint32)]
-
-
-class FileAttribute(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("type", c_uint32)]
-
-
-class FileScan(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("first", c_uint64), ("count", c_uint64),
-                ("columns", c_uint32), ("rows", c_uint32), ("pose", c_double * 12), ("station", c_double * 3),
-                ("direction", c_double * 3), ("interval", c_double), ("has_station", c_uint32), ("unused", c_uint32)]
-
-
-class GridDesc(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", c_void_p), ("column", c_void_p),
-                ("row", c_void_p), ("station", c_double * 3)]
-
-
 class CloudStyle(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
                 ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
@@ -213,6 +191,28 @@ class Panorama(Descriptor):
                 ("near_clip", c_double), ("far_clip", c_double)]
 
 
+class FileInfo(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
+                ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32), ("origin", c_double * 3),
+                ("box_min", c_double * 3), ("box_max", c_double * 3), ("invalid_positions", c_uint64),
+                ("stations", c_uint32), ("scans", c_uint32), ("splats", c_uint32), ("unused", c_uint32)]
+
+
+class FileAttribute(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("type", c_uint32)]
+
+
+class FileScan(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("first", c_uint64), ("count", c_uint64),
+                ("columns", c_uint32), ("rows", c_uint32), ("pose", c_double * 12), ("station", c_double * 3),
+                ("direction", c_double * 3), ("interval", c_double), ("has_station", c_uint32), ("unused", c_uint32)]
+
+
+class GridDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", c_void_p), ("column", c_void_p),
+                ("row", c_void_p), ("station", c_double * 3)]
+
+
 class MeshDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("position", Array), ("normal", Array),
                 ("color", Array), ("triangle_count", c_uint64), ("indices", c_void_p), ("uv", Array)]
@@ -295,22 +295,6 @@ CALLS = {
     "patina_cloud_open": (c_char_p, POINTER(c_void_p)),
     "patina_cloud_verify": (c_char_p, c_void_p),
     "patina_cloud_get_info": (c_void_p, POINTER(CloudInfo)),
-    "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
-    "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
-    "patina_file_destroy": (c_void_p,),
-    "patina_file_get_info": (c_void_p, POINTER(FileInfo)),
-    "patina_file_get_attribute": (c_void_p, c_uint32, POINTER(FileAttribute)),
-    "patina_file_get_scan": (c_void_p, c_uint32, POINTER(FileScan)),
-    "patina_file_read_positions": (c_void_p, c_void_p, c_size_t),
-    "patina_file_read_normals": (c_void_p, c_void_p, c_size_t),
-    "patina_file_read_colors_u8": (c_void_p, c_void_p, c_size_t),
-    "patina_file_read_colors_f32": (c_void_p, c_void_p, c_size_t),
-    "patina_file_read_stations": (c_void_p, c_void_p, c_size_t),
-    "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
-    "patina_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p),
-    "patina_file_cloud": (c_void_p, c_uint32, c_void_p, POINTER(c_void_p)),
-    "patina_cloud_load": (c_char_p, c_void_p, POINTER(c_void_p)),
-    "patina_write_ply": (c_char_p, POINTER(CloudDesc)),
     "patina_ramp": (c_char_p, c_void_p),
     "patina_scene_create": (POINTER(c_void_p),),
     "patina_scene_destroy": (c_void_p,),
@@ -344,6 +328,22 @@ CALLS = {
     "patina_panorama_camera": (POINTER(Panorama), c_uint32, POINTER(Camera), c_void_p),
     "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
     "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
+    "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
+    "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
+    "patina_file_destroy": (c_void_p,),
+    "patina_file_get_info": (c_void_p, POINTER(FileInfo)),
+    "patina_file_get_attribute": (c_void_p, c_uint32, POINTER(FileAttribute)),
+    "patina_file_get_scan": (c_void_p, c_uint32, POINTER(FileScan)),
+    "patina_file_read_positions": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_normals": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_colors_u8": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_colors_f32": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_stations": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
+    "patina_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p),
+    "patina_file_cloud": (c_void_p, c_uint32, c_void_p, POINTER(c_void_p)),
+    "patina_cloud_load": (c_char_p, c_void_p, POINTER(c_void_p)),
+    "patina_write_ply": (c_char_p, POINTER(CloudDesc)),
     "patina_mesh_create": (POINTER(MeshDesc), POINTER(c_void_p)),
     "patina_mesh_destroy": (c_void_p,),
     "patina_mesh_get_info": (c_void_p, POINTER(MeshInfo)),
@@ -386,9 +386,9 @@ CALLS = {
 RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_message": c_size_t,
            "patina_log_next": c_size_t, "patina_progress_destroy": None, "patina_progress_cancel": None,
            "patina_progress_value": c_float, "patina_device_destroy": None, "patina_cloud_destroy": None,
-           "patina_file_destroy": None, "patina_scene_destroy": None, "patina_frame_destroy": None,
-           "patina_frame_cancel": None, "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t,
-           "patina_frame_plan_text": c_size_t, "patina_mesh_destroy": None, "patina_texture_destroy": None,
+           "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
+           "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
+           "patina_file_destroy": None, "patina_mesh_destroy": None, "patina_texture_destroy": None,
            "patina_mask_destroy": None, "patina_grade_destroy": None, "patina_scans_destroy": None,
            "patina_field_destroy": None, "patina_task_destroy": None}
 
