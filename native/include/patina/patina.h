@@ -95,7 +95,7 @@ typedef struct patina_task patina_task;
 
 // ---- errors, log, version -------------------------------------------------------------------------------------
 
-// Library version as "0.1.0"; static storage.
+// Library version as "0.1.0+1a2b3c4d5e6f", the last a sum of the sources; static storage.
 PATINA_API const char *patina_version(void);
 // The general sentence of a code; static storage, never NULL.
 PATINA_API const char *patina_error_text(int code);
