@@ -121,7 +121,7 @@ static inline int pt_of_picture(enum pt_plane plane)
     return pt_plane_rows[plane].size == PT_SIZE_CROP && pt_plane_rows[plane].slots == PT_SLOTS_ONE;
 }
 
-// Of 16 bytes: what is counted, and for each record its keys on the processor, and lists: a tile's always fits.
+// Of 16 bytes: what is counted, and for each record six entries of tiles' lists: a tile's always fits.
 enum { PT_SOFT_BINS_HEAD = 4, PT_SOFT_BINS_EACH = 3 };
 
 enum { PT_SLOTS = 16 }; // levels or layers that a plane may have

@@ -76,6 +76,8 @@ bool box_of(vec4 p, out uvec4 box)
     float begin[2] = float[2](view.ray_x0, view.ray_y0), step_size[2] = float[2](view.ray_xs, view.ray_ys), center[2] = float[2](p.x * r, p.y * r);
     int origin[2] = int[2](view.origin_x, view.origin_y);
     bool some = view.perspective == 0u || !of_discs() || PT_SOFT_BEFORE < p.z; // else it lies behind the eye
+    if (of_discs()) // others belong to another slab as a whole
+        some = some && args.z_from < p.z && p.z <= args.z_to;
     for (int k = 0; k < 2; k++) {
         float low = float(origin[k] + int(view.rect[k])), high = float(origin[k] + int(view.rect[2 + k]));
         precise vec2 ends;

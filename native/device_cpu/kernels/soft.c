@@ -6,6 +6,7 @@
 struct soft {
     struct pt_soft_bins bins;
     char *memory;  // of each thread
+    size_t own;    // bytes of it
     uint32_t room; // balls in the longest list
     _Atomic uint64_t fragments;
 };
@@ -15,17 +16,19 @@ static void load(struct pt_soft_tile *tile)
     const struct soft_args *args = tile->bins->args;
     const uint64_t *keys = PT_DATA(tile->bins->call, soft, keys);
     const float *reached = PT_DATA(tile->bins->call, soft, reached);
-    for (uint32_t i = 0; i < PT_SOFT_PIXELS; i++) {
-        const uint32_t x = i % PT_SOFT_TILE, y = i / PT_SOFT_TILE;
-        const size_t at = ((size_t)tile->y + y) * args->view.width + (size_t)tile->x + x;
+    memset(tile->color, 0, sizeof tile->color);
+    memset(tile->density, 0, sizeof tile->density);
+    memset(tile->from, 0, sizeof tile->from);
+    memset(tile->to, 0, sizeof tile->to);
+    for (uint32_t i = 0; i < PT_SOFT_PIXELS; i++)
         tile->through[i] = 1.0f;
-        tile->color[0][i] = tile->color[1][i] = tile->color[2][i] = tile->density[i] = 0.0f;
-        tile->from[i] = tile->to[i] = 0.0f;
-        if (x >= tile->width || y >= tile->height)
-            continue;
-        tile->from[i] = args->layered ? pt_max(reached[at], args->z_from) : args->z_from;
-        tile->to[i] = args->layered == 2 ? args->z_to : pt_min(pt_float((uint32_t)(keys[at] >> 32)), args->z_to);
-    }
+    for (uint32_t y = 0; y < tile->height; y++)
+        for (uint32_t x = 0; x < tile->width; x++) {
+            const size_t at = ((size_t)tile->y + y) * args->view.width + (size_t)tile->x + x;
+            const uint32_t i = pt_soft_at(x, y);
+            tile->from[i] = args->layered ? pt_max(reached[at], args->z_from) : args->z_from;
+            tile->to[i] = args->layered == 2 ? args->z_to : pt_min(pt_float((uint32_t)(keys[at] >> 32)), args->z_to);
+        }
 }
 
 static void save_pixel(const struct pt_soft_tile *tile, uint32_t i, uint32_t x, uint32_t y)
@@ -56,24 +59,32 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
     const uint32_t *rect = bins->args->view.rect;
     for (uint32_t t = begin + bins->first; t < end + bins->first && !pt_cpu_cancelled(bins->call); t++) {
         const uint32_t x = rect[0] + t % bins->columns * PT_SOFT_TILE, y = rect[1] + t / bins->columns * PT_SOFT_TILE;
-        const uint32_t *list = bins->lists + bins->begins[t], count = bins->begins[t + 1] - bins->begins[t];
-        struct pt_soft_tile tile = {.bins = bins, .x = (int32_t)x, .y = (int32_t)y, .thread = thread};
+        const uint32_t count = bins->begins[t + 1] - bins->begins[t];
+        if (!count && !bins->args->layered && !bins->args->veils && bins->args->density != 1)
+            continue; // nothing would change
+        struct pt_soft_tile tile;
+        struct pt_soft_order order;
+        char *memory = soft->memory + thread * soft->own;
+        tile.bins = bins;
+        tile.x = (int32_t)x;
+        tile.y = (int32_t)y;
         tile.width = rect[2] - x < PT_SOFT_TILE ? rect[2] - x : PT_SOFT_TILE;
         tile.height = rect[3] - y < PT_SOFT_TILE ? rect[3] - y : PT_SOFT_TILE;
+        tile.fragments = 0;
+        if (count)
+            pt_soft_order_open(&order, bins->lists + bins->begins[t], (uint64_t *)(void *)memory, count);
         if (bins->args->veils) {
-            pt_soft_veils(&tile, list, count);
+            pt_soft_veils(&tile, count ? pt_soft_order_all(&order) : NULL, count);
             continue;
         }
         load(&tile);
-        if (count && bins->args->model >= PT_SOFT_SPLATS)
-            pt_soft_splats(&tile, list, count);
-        else if (count && bins->args->model == PT_SOFT_EXPRESS)
-            pt_soft_discs(&tile, list, count);
+        if (count && PT_SOFT_DISCS(bins->args->model))
+            pt_soft_tile_discs(&tile, &order);
         else if (count)
-            pt_soft_balls(&tile, list, count, soft->memory + thread * pt_soft_hit_bytes(soft->room), soft->room);
-        for (uint32_t i = 0; i < PT_SOFT_PIXELS; i++)
-            if (i % PT_SOFT_TILE < tile.width && i / PT_SOFT_TILE < tile.height)
-                save_pixel(&tile, i, x + i % PT_SOFT_TILE, y + i / PT_SOFT_TILE);
+            pt_soft_balls(&tile, pt_soft_order_all(&order), count, memory + soft->room * sizeof *bins->lists, soft->room);
+        for (uint32_t k = 0; k < tile.height; k++)
+            for (uint32_t i = 0; i < tile.width; i++)
+                save_pixel(&tile, pt_soft_at(i, k), x + i, y + k);
         atomic_fetch_add_explicit(&soft->fragments, tile.fragments, memory_order_relaxed);
     }
 }
@@ -87,8 +98,10 @@ static int draw_batch(struct soft *soft)
         soft->room = count > soft->room ? count : soft->room;
     }
     soft->room = (soft->room + 31) / 16 * 16;
-    if (!PT_SOFT_DISCS(bins->args->model) && !bins->args->veils &&
-        !(soft->memory = pt_cpu_scratch(bins->call, 1, pt_pool_threads(bins->call->pool) * pt_soft_hit_bytes(soft->room))))
+    soft->own = soft->room * sizeof *bins->lists;
+    if (!PT_SOFT_DISCS(bins->args->model) && !bins->args->veils)
+        soft->own += pt_soft_hit_bytes(soft->room);
+    if (!(soft->memory = pt_cpu_scratch(bins->call, 1, pt_pool_threads(bins->call->pool) * soft->own)))
         return PATINA_ERROR_MEMORY;
     pt_parallel(bins->call->pool, bins->end - bins->first, 1, draw_tiles, soft);
     return pt_cpu_cancelled(bins->call) ? PATINA_ERROR_CANCELLED : PATINA_OK;

@@ -323,7 +323,7 @@ static void pt_soft_balls(struct pt_soft_tile *tile, const uint32_t *list, uint3
     pt_soft_lay_out(&hits, memory, room);
     for (uint32_t y = 0; y < tile->height; y++)
         for (uint32_t x = 0; x < tile->width; x++) {
-            const uint32_t at = y * PT_SOFT_TILE + x;
+            const uint32_t at = pt_soft_at(x, y);
             struct pt_soft_ray ray = {.x = (float)(view->origin_x + tile->x + (int32_t)x) + 0.5f,
                                       .y = (float)(view->origin_y + tile->y + (int32_t)y) + 0.5f,
                                       .n = 1.0f,

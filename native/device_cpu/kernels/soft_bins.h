@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Records of soft points, in order of depth, for each tile of 16 x 16 pixels: sorted once, then shared out in that order, so that
-// every list is sorted whatever the threads. Tiles are taken in batches whose lists fit the bins; a list always does.
+// Records of soft points, for each tile of 16 x 16 pixels those that its pixels may show: looked through once, then shared out in
+// the order of records, so that lists are the same whatever the threads; who draws a tile sorts its list (soft_order.h). Tiles are
+// taken in batches whose lists fit the bins; a list always does.
 #ifndef PT_SOFT_BINS_H
 #define PT_SOFT_BINS_H
 
@@ -11,8 +12,9 @@
 
 enum { PT_SOFT_RANGES = 64, PT_SOFT_COUNTS = 1 << 22 };
 
-struct pt_soft_box { // tiles, both ends included
+struct pt_soft_seen { // a record that is drawn: its tiles, both ends included, and the order of its depth
     uint16_t x0, y0, x1, y1;
+    uint32_t order, record;
 };
 
 struct pt_soft_bins {
@@ -22,14 +24,12 @@ struct pt_soft_bins {
     uint32_t columns, rows, tiles, ranges;
     uint32_t drawn;            // of the records
     uint32_t first, end;       // tiles of this batch
-    uint64_t *keys, *other;    // depth << 32 | record
-    struct pt_soft_box *boxes; // by record
-    uint32_t *lists;
+    struct pt_soft_seen *seen; // of each range, from its first record's place on
+    uint64_t *lists;           // order of depth << 32 | record
     size_t room;
-    uint32_t *counts; // by range and digit, then by range and tile
+    uint32_t *counts; // by range and tile; then where in the lists they go
     uint32_t *begins; // of the tiles' lists, in the batch; tiles + 1 of them
     uint32_t count[PT_SOFT_RANGES];
-    int shift;
 };
 
 // Floats in the order of whole numbers, those below 0 too.
@@ -37,11 +37,6 @@ static inline uint32_t pt_soft_order(float z)
 {
     const uint32_t bits = pt_bits(z);
     return bits >> 31 ? ~bits : bits | 1u << 31;
-}
-
-static inline uint32_t pt_soft_range(uint32_t count, uint32_t ranges, uint32_t i)
-{
-    return (uint32_t)((uint64_t)count * i / ranges);
 }
 
 // Of a light's view all are balls.
@@ -72,6 +67,8 @@ static inline vm pt_soft_boxes(const struct pt_soft_bins *bins, const vf p[4], v
     vf r = one;
     if (view->perspective && pt_soft_of_discs(bins->args)) // others lie behind the eye
         some = vm_and(some, vf_lt(vf_set(PT_SOFT_BEFORE), p[2]));
+    if (pt_soft_of_discs(bins->args)) // others belong to another slab as a whole
+        some = vm_and(some, vm_and(vf_lt(vf_set(bins->args->z_from), p[2]), vf_le(p[2], vf_set(bins->args->z_to))));
     vm good = some; // of others the eye may stand in the ball: it is everywhere
     if (view->perspective && !pt_soft_of_discs(bins->args))
         good = vm_and(some, vf_lt(vf_set(1.001f) * p[3], p[2]));
@@ -101,16 +98,21 @@ static inline vm pt_soft_boxes(const struct pt_soft_bins *bins, const vf p[4], v
     return some;
 }
 
-// Boxes and keys of a range of records, packed at the range's beginning.
+static inline uint32_t pt_soft_first(const struct pt_soft_bins *bins, uint32_t range)
+{
+    return (uint32_t)((uint64_t)(bins->args->records / 16) * range / bins->ranges) * 16;
+}
+
+// Which records of a range are drawn, and on how many tiles each.
 static void pt_soft_look(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct pt_soft_bins *bins = context;
     (void)thread;
-    for (uint32_t q = begin; q < end; q++) {
-        const uint32_t first = pt_soft_range(bins->args->records / 16, bins->ranges, q) * 16;
-        const uint32_t last = pt_soft_range(bins->args->records / 16, bins->ranges, q + 1) * 16;
-        uint64_t *keys = bins->other + first;
-        bins->count[q] = 0;
+    for (uint32_t q = begin; q < end && !pt_cpu_cancelled(bins->call); q++) {
+        const uint32_t first = pt_soft_first(bins, q), last = pt_soft_first(bins, q + 1);
+        struct pt_soft_seen *seen = bins->seen + first;
+        uint32_t *counts = bins->counts + (size_t)q * bins->tiles;
+        memset(counts, 0, bins->tiles * sizeof *counts);
         for (uint32_t i = first; i < last; i += PT_LANES) {
             vf p[4];
             vi box[4];
@@ -126,89 +128,37 @@ static void pt_soft_look(void *context, uint32_t begin, uint32_t end, uint32_t t
             vf_store(z, p[2]);
             for (uint32_t lanes = vm_bits(some); lanes; lanes &= lanes - 1) {
                 const uint32_t k = (uint32_t)__builtin_ctz(lanes);
-                bins->boxes[i + k] = (struct pt_soft_box){(uint16_t)words[0][k], (uint16_t)words[1][k], (uint16_t)words[2][k],
-                                                          (uint16_t)words[3][k]};
-                keys[bins->count[q]++] = (uint64_t)pt_soft_order(z[k]) << 32 | (i + k);
+                *seen++ = (struct pt_soft_seen){(uint16_t)words[0][k], (uint16_t)words[1][k], (uint16_t)words[2][k],
+                                                (uint16_t)words[3][k], pt_soft_order(z[k]),   i + k};
+                for (uint32_t y = words[1][k]; y <= words[3][k]; y++)
+                    for (uint32_t x = words[0][k]; x <= words[2][k]; x++)
+                        counts[y * bins->columns + x]++;
             }
         }
+        bins->count[q] = (uint32_t)(seen - (bins->seen + first));
     }
 }
 
-static void pt_soft_digits(void *context, uint32_t begin, uint32_t end, uint32_t thread)
-{
-    struct pt_soft_bins *bins = context;
-    (void)thread;
-    for (uint32_t q = begin; q < end; q++) {
-        uint32_t *counts = bins->counts + 256 * (size_t)q;
-        memset(counts, 0, 256 * sizeof *counts);
-        for (uint32_t i = pt_soft_range(bins->drawn, bins->ranges, q); i < pt_soft_range(bins->drawn, bins->ranges, q + 1); i++)
-            counts[bins->keys[i] >> bins->shift & 255u]++;
-    }
-}
-
-static void pt_soft_move(void *context, uint32_t begin, uint32_t end, uint32_t thread)
-{
-    struct pt_soft_bins *bins = context;
-    (void)thread;
-    for (uint32_t q = begin; q < end; q++) {
-        uint32_t *to = bins->counts + 256 * (size_t)q;
-        for (uint32_t i = pt_soft_range(bins->drawn, bins->ranges, q); i < pt_soft_range(bins->drawn, bins->ranges, q + 1); i++)
-            bins->other[to[bins->keys[i] >> bins->shift & 255u]++] = bins->keys[i];
-    }
-}
-
-// By depth; equal ones keep the order of their records.
-static void pt_soft_sort(struct pt_soft_bins *bins)
-{
-    for (bins->shift = 32; bins->shift < 64; bins->shift += 8) {
-        uint32_t at = 0;
-        pt_parallel(bins->call->pool, bins->ranges, 1, pt_soft_digits, bins);
-        for (uint32_t digit = 0; digit < 256; digit++)
-            for (uint32_t q = 0; q < bins->ranges; q++) {
-                uint32_t *count = bins->counts + 256 * (size_t)q + digit, own = *count;
-                *count = at;
-                at += own;
-            }
-        pt_parallel(bins->call->pool, bins->ranges, 1, pt_soft_move, bins);
-        uint64_t *swap = bins->keys;
-        bins->keys = bins->other;
-        bins->other = swap;
-    }
-}
-
-// For each range of the sorted records: how many fall on each tile; then, with the counts made places, where they lie.
-static void pt_soft_share(struct pt_soft_bins *bins, uint32_t q, int fill)
-{
-    uint32_t *counts = bins->counts + (size_t)q * bins->tiles;
-    for (uint32_t i = pt_soft_range(bins->drawn, bins->ranges, q); i < pt_soft_range(bins->drawn, bins->ranges, q + 1); i++) {
-        const uint32_t record = (uint32_t)bins->keys[i];
-        const struct pt_soft_box box = bins->boxes[record];
-        for (uint32_t y = box.y0; y <= box.y1; y++)
-            for (uint32_t x = box.x0; x <= box.x1; x++) {
-                const uint32_t tile = y * bins->columns + x;
-                if (!fill)
-                    counts[tile]++;
-                else if (tile >= bins->first && tile < bins->end)
-                    bins->lists[counts[tile]++] = record;
-            }
-    }
-}
-
-static void pt_soft_count(void *context, uint32_t begin, uint32_t end, uint32_t thread)
-{
-    struct pt_soft_bins *bins = context;
-    (void)thread;
-    for (uint32_t q = begin; q < end; q++) {
-        memset(bins->counts + (size_t)q * bins->tiles, 0, bins->tiles * sizeof *bins->counts);
-        pt_soft_share(bins, q, 0);
-    }
-}
-
+// A range's records into the lists of this batch's tiles.
 static void pt_soft_fill(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
+    struct pt_soft_bins *bins = context;
+    const uint32_t top = bins->first / bins->columns, bottom = (bins->end - 1) / bins->columns;
     (void)thread;
-    for (uint32_t q = begin; q < end; q++)
-        pt_soft_share(context, q, 1);
+    for (uint32_t q = begin; q < end && !pt_cpu_cancelled(bins->call); q++) {
+        const struct pt_soft_seen *seen = bins->seen + pt_soft_first(bins, q);
+        uint32_t *counts = bins->counts + (size_t)q * bins->tiles;
+        for (uint32_t i = 0; i < bins->count[q]; i++) {
+            const uint64_t own = (uint64_t)seen[i].order << 32 | seen[i].record;
+            const uint32_t y0 = seen[i].y0 > top ? seen[i].y0 : top, y1 = seen[i].y1 < bottom ? seen[i].y1 : bottom;
+            for (uint32_t y = y0; y <= y1; y++)
+                for (uint32_t x = seen[i].x0; x <= seen[i].x1; x++) {
+                    const uint32_t tile = y * bins->columns + x;
+                    if (tile >= bins->first && tile < bins->end)
+                        bins->lists[counts[tile]++] = own;
+                }
+        }
+    }
 }
 
 // Lists of the next batch, from bins->end on; 0: all tiles were taken.
@@ -233,41 +183,37 @@ static inline int pt_soft_batch(struct pt_soft_bins *bins)
         bins->end = tile + 1;
         bins->begins[tile + 1] = (uint32_t)used;
     }
-    pt_parallel(bins->call->pool, bins->ranges, 1, pt_soft_fill, bins);
+    if (bins->drawn)
+        pt_parallel(bins->call->pool, bins->ranges, 1, pt_soft_fill, bins);
     return 1;
 }
 
-// Looks through the records and sorts them. The bins: 64 bytes of what is counted, two keys a record, lists.
+// Looks through the records. The bins: 64 bytes of what is counted, lists.
 static inline int pt_soft_bins_open(struct pt_soft_bins *bins)
 {
     const struct soft_args *args = bins->args;
-    const uint32_t *rect = args->view.rect, n = args->records;
+    const uint32_t *rect = args->view.rect;
     char *memory = PT_DATA(bins->call, soft, bins);
     bins->columns = (rect[2] - rect[0] + PT_SOFT_TILE - 1) / PT_SOFT_TILE;
     bins->rows = (rect[3] - rect[1] + PT_SOFT_TILE - 1) / PT_SOFT_TILE;
     bins->tiles = bins->columns * bins->rows;
     bins->ranges = bins->tiles > PT_SOFT_COUNTS / PT_SOFT_RANGES ? PT_SOFT_COUNTS / bins->tiles + 1 : PT_SOFT_RANGES;
-    bins->keys = (uint64_t *)(void *)(memory + 64);
-    bins->other = bins->keys + n;
-    bins->lists = (uint32_t *)(void *)(bins->other + n);
-    bins->room = (bins->call->buffers[PT_BUF_soft_bins]->size - 64) / 4 - 4 * (size_t)n;
-    const size_t counts = (size_t)bins->ranges * (bins->tiles > 256 ? bins->tiles : 256);
-    bins->boxes = pt_cpu_scratch(bins->call, 0, n * sizeof *bins->boxes + (counts + bins->tiles + 1) * sizeof *bins->counts);
-    if (!bins->boxes)
+    bins->lists = (uint64_t *)(void *)(memory + 64);
+    bins->room = (bins->call->buffers[PT_BUF_soft_bins]->size - 64) / sizeof *bins->lists;
+    const size_t counts = (size_t)bins->ranges * bins->tiles;
+    bins->seen = pt_cpu_scratch(bins->call, 0,
+                                args->records * sizeof *bins->seen + (counts + bins->tiles + 1) * sizeof *bins->counts);
+    if (!bins->seen)
         return PATINA_ERROR_MEMORY;
-    bins->counts = (uint32_t *)(void *)(bins->boxes + n);
+    bins->counts = (uint32_t *)(void *)(bins->seen + args->records);
     bins->begins = bins->counts + counts;
     pt_parallel(bins->call->pool, bins->ranges, 1, pt_soft_look, bins);
-    bins->drawn = 0;
-    for (uint32_t q = 0; q < bins->ranges; q++) {
-        memcpy(bins->keys + bins->drawn, bins->other + pt_soft_range(n / 16, bins->ranges, q) * 16,
-               bins->count[q] * sizeof *bins->keys);
+    bins->drawn = bins->end = 0;
+    if (pt_cpu_cancelled(bins->call))
+        return PATINA_ERROR_CANCELLED;
+    for (uint32_t q = 0; q < bins->ranges; q++)
         bins->drawn += bins->count[q];
-    }
-    pt_soft_sort(bins);
-    pt_parallel(bins->call->pool, bins->ranges, 1, pt_soft_count, bins);
-    bins->end = 0;
-    return pt_cpu_cancelled(bins->call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
+    return PATINA_OK;
 }
 
 #endif

@@ -1,29 +1,63 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Express model: discs across the rays to their centres, front to back over the pixels of a tile.
+// The Express model: discs across the rays to their centres, front to back over the pixels of a tile. Splats and One Layer: the same
+// discs. They are taken 64 at a time: what each looks like on the tile, then of each group of pixels those that reach it, with the
+// group's pixels in registers.
 #ifndef PT_SOFT_DISCS_H
 #define PT_SOFT_DISCS_H
 
+#include "soft_order.h"
 #include "soft_tile.h"
 
-struct pt_soft_disc { // q = (a dx + b dy) dx + c dy^2
-    float x, y, z, a, b, c, opacity, weight, color[3], density, r;
-    int32_t x0, y0, x1, y1; // of the tile, the latter beyond
+#define PT_SOFT_INLINE static inline __attribute__((always_inline))
+
+enum {
+    PT_SOFT_TAKEN = 64, // discs at a time
+    PT_SOFT_VECTORS = PT_SOFT_GROUP / PT_LANES
 };
 
-// PT_LANES records of a list.
-static inline void pt_soft_set_discs(const struct pt_soft_tile *tile, const uint32_t *list, uint32_t count,
-                                     struct pt_soft_disc *out)
+struct pt_soft_discs { // q = (a dx + b dy) dx + c dy^2
+    uint32_t count;
+    int plain; // every weight is 1
+    float x[PT_SOFT_TAKEN], y[PT_SOFT_TAKEN], z[PT_SOFT_TAKEN], a[PT_SOFT_TAKEN], b[PT_SOFT_TAKEN], c[PT_SOFT_TAKEN];
+    float opacity[PT_SOFT_TAKEN], weight[PT_SOFT_TAKEN], color[3][PT_SOFT_TAKEN], density[PT_SOFT_TAKEN], end[PT_SOFT_TAKEN];
+    uint32_t groups[PT_SOFT_TAKEN];    // of the tile's, which it may reach
+    uint64_t reaching[PT_SOFT_GROUPS]; // which of the discs may reach a group
+};
+
+// Groups of the tile that pixels x0..x1, y0..y1 lie in, the latter beyond.
+static inline uint32_t pt_soft_groups(uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1)
+{
+    if (x0 >= x1 || y0 >= y1)
+        return 0;
+    const uint32_t row = (2u << (x1 - 1) / PT_SOFT_WIDE) - (1u << x0 / PT_SOFT_WIDE);
+    const uint32_t first = y0 / PT_SOFT_TALL * PT_SOFT_ACROSS, last = ((y1 - 1) / PT_SOFT_TALL + 1) * PT_SOFT_ACROSS;
+    return row * 0x11111111u & (uint32_t)((1ull << last) - (1ull << first));
+}
+
+// Pixels from *low to *high, the latter beyond, are within `reach` of the middle, of the tile's.
+static inline void pt_soft_span(vf middle, vf reach, vi *low, vi *high)
+{
+    const vf zero = vf_zero(), most = vf_set(PT_SOFT_TILE);
+    *low = vf_int(vf_min(vf_max(middle - reach, zero), most));
+    *high = vf_int(vf_min(vf_max(middle + reach + vf_set(1.0f), zero), most));
+}
+
+// PT_LANES entries of a list become discs from `to` on.
+static inline void pt_soft_set_discs(const struct pt_soft_tile *tile, const uint64_t *list, uint32_t count, uint32_t to,
+                                     struct pt_soft_discs *out)
 {
     const struct view_args *view = &tile->bins->args->view;
     const vm some = vm_first(count);
-    const vi at = vi_mul(vi_load(list), vi_set(2));
-    const vf one = vf_set(1.0f), xs = vf_set(view->ray_xs), ys = vf_set(view->ray_ys);
+    const vf one = vf_set(1.0f), four = vf_set(4.0f), xs = vf_set(view->ray_xs), ys = vf_set(view->ray_ys);
+    uint32_t records[PT_LANES] = {0}, spans[4][PT_LANES];
     vf p[4], look[4], u = vf_zero(), v = vf_zero();
-    float lanes[8][PT_LANES], looks[4][PT_LANES];
-    vf_gather4(tile->bins->points, at, some, p);
-    vf_gather4(tile->bins->points, vi_add(at, vi_set(1)), some, look);
+    vi ends[4];
+    for (uint32_t k = 0; k < count; k++)
+        records[k] = 2u * (uint32_t)list[k];
+    vf_gather4(tile->bins->points, vi_load(records), some, p);
+    vf_gather4(tile->bins->points, vi_add(vi_load(records), vi_set(1)), some, look);
     vf scale = vf_rcp(vf_select(some, p[3], one));
-    const vf density = (scale * scale) * vf_set(PT_SOFT_DISC);
+    vf_store(out->density + to, (scale * scale) * vf_set(PT_SOFT_DISC));
     if (view->perspective) {
         const vf r = vf_rcp(vf_select(some, p[2], one));
         p[0] = p[0] * r;
@@ -33,43 +67,62 @@ static inline void pt_soft_set_discs(const struct pt_soft_tile *tile, const uint
         scale = scale * p[2];
     }
     const vf inverse = vf_rcp((u * u + v * v) + one), square = scale * scale;
-    const vf columns[8] = {p[0],
-                           p[1],
-                           p[2],
-                           (square * (xs * xs)) * (one - (u * u) * inverse),
-                           (square * (xs * ys)) * (vf_set(-2.0f) * ((u * v) * inverse)),
-                           (square * (ys * ys)) * (one - (v * v) * inverse),
-                           density,
-                           p[3]};
-    for (int k = 0; k < 8; k++)
-        vf_store(lanes[k], columns[k]);
+    const vf a = (square * (xs * xs)) * (one - (u * u) * inverse),
+             b = (square * (xs * ys)) * (vf_set(-2.0f) * ((u * v) * inverse)),
+             c = (square * (ys * ys)) * (one - (v * v) * inverse);
+    const vf x = (p[0] - vf_set((float)(view->origin_x + tile->x))) - vf_set(0.5f),
+             y = (p[1] - vf_set((float)(view->origin_y + tile->y))) - vf_set(0.5f);
+    const vi word = vf_bits(look[3]);
+    const vf columns[11] = {x,
+                            y,
+                            p[2],
+                            a,
+                            b,
+                            c,
+                            p[2] + p[3],
+                            look[0],
+                            look[1],
+                            look[2],
+                            vi_convert(vi_shr(word, PT_SOFT_SHIFT)) * vf_set(1.0f / PT_SOFT_STEPS)};
+    float *const of[11] = {out->x,   out->y,        out->z,        out->a,        out->b,      out->c,
+                           out->end, out->color[0], out->color[1], out->color[2], out->opacity};
+    for (int k = 0; k < 11; k++)
+        vf_store(of[k] + to, columns[k]);
+    const vi share = vi_and(word, vi_set(255));
+    vf_store(out->weight + to, vi_convert(share) * vf_set(1.0f / 255.0f));
+    out->plain &= !vm_bits(vm_and(some, vm_not(vi_eq(share, vi_set(255)))));
+    // q reaches 1 at these on each side of the middle
+    const vf flat = (four * a) * c - b * b, far = vf_set(1e9f), wider = vf_set(1.0001f), over = vf_set(0.01f);
+    const vm sure = vm_and(some, vm_and(vf_lt(vf_set(1e-30f), flat), vf_lt(flat, vf_set(1e30f))));
+    const vf share_of_flat = four * vf_rcp(vf_select(sure, flat, one));
+    const vf wide = vf_max(c * share_of_flat, vf_set(1e-30f)), tall = vf_max(a * share_of_flat, vf_set(1e-30f));
+    pt_soft_span(x, vf_select(sure, (wide * vf_rsqrt(wide)) * wider + over, far), &ends[0], &ends[2]);
+    pt_soft_span(y, vf_select(sure, (tall * vf_rsqrt(tall)) * wider + over, far), &ends[1], &ends[3]);
     for (int k = 0; k < 4; k++)
-        vf_store(looks[k], look[k]);
-    for (uint32_t i = 0; i < count; i++) {
-        const uint32_t word = pt_bits(looks[3][i]);
-        out[i] = (struct pt_soft_disc){lanes[0][i] - (float)(view->origin_x + tile->x) - 0.5f,
-                                       lanes[1][i] - (float)(view->origin_y + tile->y) - 0.5f,
-                                       lanes[2][i],
-                                       lanes[3][i],
-                                       lanes[4][i],
-                                       lanes[5][i],
-                                       (float)(word >> PT_SOFT_SHIFT) * (1.0f / PT_SOFT_STEPS),
-                                       (float)(word & 255u) * (1.0f / 255.0f),
-                                       {looks[0][i], looks[1][i], looks[2][i]},
-                                       lanes[6][i],
-                                       lanes[7][i],
-                                       0,
-                                       0,
-                                       0,
-                                       0};
-        // q reaches 1 at these on each side of the middle
-        const float flat = 4.0f * out[i].a * out[i].c - out[i].b * out[i].b,
-                    wide = flat > 0.0f ? __builtin_sqrtf(4.0f * out[i].c / flat) + 0.01f : 1e9f;
-        const float tall = flat > 0.0f ? __builtin_sqrtf(4.0f * out[i].a / flat) + 0.01f : 1e9f;
-        out[i].x0 = (int32_t)pt_max(out[i].x - wide, 0.0f);
-        out[i].y0 = (int32_t)pt_max(out[i].y - tall, 0.0f);
-        out[i].x1 = (int32_t)pt_min(pt_max(out[i].x + wide + 1.0f, 0.0f), (float)PT_SOFT_TILE);
-        out[i].y1 = (int32_t)pt_min(pt_max(out[i].y + tall + 1.0f, 0.0f), (float)PT_SOFT_TILE);
+        vi_store(spans[k], ends[k]);
+    for (uint32_t k = 0; k < PT_LANES; k++)
+        out->groups[to + k] = k < count ? pt_soft_groups(spans[0][k], spans[1][k], spans[2][k], spans[3][k]) : 0;
+}
+
+// The next discs of a list from i on, and which of them reach each of the groups.
+static inline void pt_soft_take(const struct pt_soft_tile *tile, struct pt_soft_order *order, uint32_t i, uint32_t groups,
+                                struct pt_soft_discs *out)
+{
+    const uint64_t *list = order->list + i;
+    out->count = order->count - i < PT_SOFT_TAKEN ? order->count - i : PT_SOFT_TAKEN;
+    out->plain = 1;
+    pt_soft_order_to(order, i + PT_SOFT_TAKEN);
+    for (uint32_t k = 0; k < out->count; k++) // each is a miss of its own
+        __builtin_prefetch(tile->bins->points + PT_SOFT_WORDS * (size_t)(uint32_t)list[k]);
+    for (uint32_t k = 0; k < out->count; k += PT_LANES)
+        pt_soft_set_discs(tile, list + k, pt_lanes_left(k, out->count), k, out);
+    for (; groups; groups &= groups - 1) {
+        const uint32_t group = (uint32_t)__builtin_ctz(groups);
+        const vi bit = vi_set(1u << group);
+        uint64_t reaching = 0;
+        for (uint32_t k = 0; k < out->count; k += PT_LANES)
+            reaching |= (uint64_t)vm_bits(vi_eq(vi_and(vi_load(out->groups + k), bit), bit)) << k;
+        out->reaching[group] = reaching;
     }
 }
 
@@ -93,110 +146,178 @@ static inline vf pt_soft_share_of(float weight, vf q, vf cosine)
     return (vf_set(1.0f) - root) * vf_set(1.0f - weight) + cosine * vf_set(weight);
 }
 
-static inline void pt_soft_add_disc(struct pt_soft_tile *tile, const struct pt_soft_disc *d)
+// ---- a group -------------------------------------------------------------------------------------------------------------
+
+struct pt_soft_group { // PT_LANES pixels of one
+    vf x, y, from, to;
+};
+
+static inline struct pt_soft_group pt_soft_group_at(const struct pt_soft_tile *tile, uint32_t group, uint32_t vector)
 {
-    const vf one = vf_set(1.0f), zero = vf_zero(), z = vf_set(d->z), spent = vf_set(PT_SOFT_SPENT), a = vf_set(d->a);
-    const int counted = tile->bins->args->density != 0;
-    for (int32_t y = d->y0; y < d->y1; y++) {
-        const float dy = d->y - (float)y;
-        const vf below = vf_set(d->b * dy), least = vf_set(d->c * (dy * dy));
-        for (int32_t x = d->x0 / PT_LANES * PT_LANES; x < d->x1; x += PT_LANES) {
-            const uint32_t at = (uint32_t)y * PT_SOFT_TILE + (uint32_t)x;
-            const vf dx = vf_set(d->x) - vi_convert(vi_add(vi_set((uint32_t)x), vi_lanes()));
-            const vf q = vf_max((a * dx + below) * dx + least, zero), through = vf_load(tile->through + at);
-            const vm within = vm_and(vf_lt(vf_load(tile->from + at), z), vf_le(z, vf_load(tile->to + at)));
-            const vm there = vm_and(vf_lt(q, one), within), some = vm_and(there, vf_le(spent, through));
-            if (!vm_bits(counted ? there : some))
-                continue;
-            const vf f = pt_soft_cosine(q), share = pt_soft_share_of(d->weight, q, f);
-            const vf part = vf_mul_where(some, through, share * vf_set(d->opacity));
-            vf_store(tile->through + at, through - part);
-            for (int k = 0; k < 3; k++)
-                vf_store(tile->color[k] + at, vf_load(tile->color[k] + at) + part * vf_set(d->color[k]));
-            if (counted) // whatever light is left
-                vf_store(tile->density + at, vf_load(tile->density + at) + vf_mul_where(there, vf_set(d->density), f));
-            tile->fragments += (uint32_t)__builtin_popcount(vm_bits(some));
-        }
-    }
+    static const float x[16] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},
+                       y[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+    const uint32_t own = vector * PT_LANES, at = group * PT_SOFT_GROUP + own;
+    return (struct pt_soft_group){vf_load(x + own) + vf_set((float)(group % PT_SOFT_ACROSS * PT_SOFT_WIDE)),
+                                  vf_load(y + own) + vf_set((float)(group / PT_SOFT_ACROSS * PT_SOFT_TALL)),
+                                  vf_load(tile->from + at), vf_load(tile->to + at)};
 }
 
-static void pt_soft_discs(struct pt_soft_tile *tile, const uint32_t *list, uint32_t count)
+// Which of the pixels disc k covers, and its q.
+PT_SOFT_INLINE vm pt_soft_covers(const struct pt_soft_discs *discs, uint32_t k, const struct pt_soft_group *own, vf *q)
 {
-    struct pt_soft_disc discs[PT_LANES];
-    for (uint32_t i = 0; i < count; i += PT_LANES) {
-        const uint32_t some = pt_lanes_left(i, count);
-        if (i % 64 == 0 && !tile->bins->args->density && pt_soft_spent(tile))
-            return;
-        pt_soft_set_discs(tile, list + i, some, discs);
-        for (uint32_t k = 0; k < some; k++)
-            pt_soft_add_disc(tile, &discs[k]);
-    }
+    const vf dx = vf_set(discs->x[k]) - own->x, dy = vf_set(discs->y[k]) - own->y, z = vf_set(discs->z[k]);
+    *q = vf_max((vf_set(discs->a[k]) * dx + vf_set(discs->b[k]) * dy) * dx + vf_set(discs->c[k]) * (dy * dy), vf_zero());
+    return vm_and(vf_lt(*q, vf_set(1.0f)), vm_and(vf_lt(own->from, z), vf_le(z, own->to)));
 }
 
-// Whether no pixel's surface goes as far as z.
-static inline int pt_soft_covered(const struct pt_soft_tile *tile, float z)
+// What the discs take of a group's light; whether it takes any more.
+PT_SOFT_INLINE int pt_soft_add_discs(struct pt_soft_tile *tile, const struct pt_soft_discs *discs, uint32_t group, int counted,
+                                     int plain, vf *fragments)
 {
+    const vf one = vf_set(1.0f), spent = vf_set(PT_SOFT_SPENT), last = vf_set(discs->z[discs->count - 1]);
     vm open = vm_of_bits(0);
-    for (uint32_t i = 0; i < PT_SOFT_PIXELS; i += PT_LANES) {
-        const vm some = vm_not(vm_and(vf_lt(vf_zero(), vf_load(tile->weight + i)), vf_lt(vf_load(tile->front + i), vf_set(z))));
-        open = vm_or(open, vm_and(some, vf_lt(vf_load(tile->from + i), vf_load(tile->to + i))));
-    }
-    return !vm_bits(open);
-}
-
-// Splats, One Layer: what of the disc belongs to a pixel's surface.
-static inline void pt_soft_add_splat(struct pt_soft_tile *tile, const struct pt_soft_disc *d)
-{
-    const vf one = vf_set(1.0f), zero = vf_zero(), z = vf_set(d->z), a = vf_set(d->a), end = vf_set(d->z + d->r);
-    for (int32_t y = d->y0; y < d->y1; y++) {
-        const float dy = d->y - (float)y;
-        const vf below = vf_set(d->b * dy), least = vf_set(d->c * (dy * dy));
-        for (int32_t x = d->x0 / PT_LANES * PT_LANES; x < d->x1; x += PT_LANES) {
-            const uint32_t at = (uint32_t)y * PT_SOFT_TILE + (uint32_t)x;
-            const vf dx = vf_set(d->x) - vi_convert(vi_add(vi_set((uint32_t)x), vi_lanes()));
-            const vf q = vf_max((a * dx + below) * dx + least, zero), weight = vf_load(tile->weight + at);
-            const vm within = vm_and(vf_lt(vf_load(tile->from + at), z), vf_le(z, vf_load(tile->to + at)));
-            const vm there = vm_and(vf_lt(q, one), within), first = vm_not(vf_lt(zero, weight));
-            const vm some = vm_and(there, vm_or(first, vf_le(z, vf_load(tile->front + at))));
-            if (!vm_bits(there))
+    for (uint32_t v = 0; v < PT_SOFT_VECTORS; v++) {
+        const uint32_t at = group * PT_SOFT_GROUP + v * PT_LANES;
+        const struct pt_soft_group own = pt_soft_group_at(tile, group, v);
+        vf through = vf_load(tile->through + at), density = vf_load(tile->density + at), many = *fragments;
+        vf color[3] = {vf_load(tile->color[0] + at), vf_load(tile->color[1] + at), vf_load(tile->color[2] + at)};
+        for (uint64_t left = discs->reaching[group]; left; left &= left - 1) {
+            const uint32_t k = (uint32_t)__builtin_ctzll(left);
+            vf q;
+            const vm there = pt_soft_covers(discs, k, &own, &q), some = vm_and(there, vf_le(spent, through));
+            if (PT_LANES == 1 && !vm_bits(there))
                 continue;
-            const vf f = pt_soft_cosine(q) + vf_set(PT_SOFT_RIM), own = vf_select(some, f, zero);
-            vf_store(tile->front + at, vf_select(vm_and(some, first), end, vf_load(tile->front + at)));
-            vf_store(tile->weight + at, weight + own);
-            vf_store(tile->opacity + at, vf_load(tile->opacity + at) + own * vf_set(d->opacity));
-            for (int k = 0; k < 3; k++)
-                vf_store(tile->color[k] + at, vf_load(tile->color[k] + at) + own * vf_set(d->color[k]));
-            if (tile->bins->args->density != 0)
-                vf_store(tile->density + at,
-                         vf_load(tile->density + at) + vf_mul_where(there, vf_set(d->density), pt_soft_cosine(q)));
-            tile->fragments += (uint32_t)__builtin_popcount(vm_bits(some));
+            const vf f = pt_soft_cosine(q), share = plain ? f : pt_soft_share_of(discs->weight[k], q, f);
+            const vf part = vf_mul_where(some, through, share * vf_set(discs->opacity[k]));
+            through = through - part;
+            for (int c = 0; c < 3; c++)
+                color[c] = color[c] + part * vf_set(discs->color[c][k]);
+            if (counted) // whatever light is left
+                density = density + vf_mul_where(there, vf_set(discs->density[k]), f);
+            many = vf_add_where(some, many, one);
         }
+        vf_store(tile->through + at, through);
+        for (int c = 0; c < 3; c++)
+            vf_store(tile->color[c] + at, color[c]);
+        if (counted)
+            vf_store(tile->density + at, density);
+        *fragments = many;
+        const vm before = vf_le(last, own.to);
+        open = vm_or(open, counted ? before : vm_and(before, vf_le(spent, through)));
     }
+    return vm_bits(open) != 0;
 }
 
-static void pt_soft_splats(struct pt_soft_tile *tile, const uint32_t *list, uint32_t count)
+// Splats, One Layer: what of the discs belongs to the pixels' surfaces; whether any may go farther.
+PT_SOFT_INLINE int pt_soft_add_splats(struct pt_soft_tile *tile, const struct pt_soft_discs *discs, uint32_t group, int counted,
+                                      vf *fragments)
+{
+    const vf one = vf_set(1.0f), zero = vf_zero(), last = vf_set(discs->z[discs->count - 1]);
+    vm open = vm_of_bits(0);
+    for (uint32_t v = 0; v < PT_SOFT_VECTORS; v++) {
+        const uint32_t at = group * PT_SOFT_GROUP + v * PT_LANES;
+        const struct pt_soft_group own = pt_soft_group_at(tile, group, v);
+        vf front = vf_load(tile->front + at), weight = vf_load(tile->weight + at), opacity = vf_load(tile->opacity + at),
+           density = vf_load(tile->density + at), many = *fragments;
+        vf color[3] = {vf_load(tile->color[0] + at), vf_load(tile->color[1] + at), vf_load(tile->color[2] + at)};
+        for (uint64_t left = discs->reaching[group]; left; left &= left - 1) {
+            const uint32_t k = (uint32_t)__builtin_ctzll(left);
+            vf q;
+            const vm there = pt_soft_covers(discs, k, &own, &q), first = vm_not(vf_lt(zero, weight)),
+                     some = vm_and(there, vm_or(first, vf_le(vf_set(discs->z[k]), front)));
+            if (PT_LANES == 1 && !vm_bits(there))
+                continue;
+            const vf f = pt_soft_cosine(q), share = vf_select(some, f + vf_set(PT_SOFT_RIM), zero);
+            front = vf_select(vm_and(some, first), vf_set(discs->end[k]), front);
+            weight = weight + share;
+            opacity = opacity + share * vf_set(discs->opacity[k]);
+            for (int c = 0; c < 3; c++)
+                color[c] = color[c] + share * vf_set(discs->color[c][k]);
+            if (counted)
+                density = density + vf_mul_where(there, vf_set(discs->density[k]), f);
+            many = vf_add_where(some, many, one);
+        }
+        vf_store(tile->front + at, front);
+        vf_store(tile->weight + at, weight);
+        vf_store(tile->opacity + at, opacity);
+        for (int c = 0; c < 3; c++)
+            vf_store(tile->color[c] + at, color[c]);
+        if (counted)
+            vf_store(tile->density + at, density);
+        *fragments = many;
+        const vm before = vf_le(last, own.to);
+        open = vm_or(open, counted ? before : vm_and(before, vm_not(vm_and(vf_lt(zero, weight), vf_lt(front, last)))));
+    }
+    return vm_bits(open) != 0;
+}
+
+// ---- a tile --------------------------------------------------------------------------------------------------------------
+
+static inline uint32_t pt_soft_open_groups(const struct pt_soft_tile *tile)
+{
+    uint32_t open = 0;
+    for (uint32_t at = 0; at < PT_SOFT_PIXELS; at += PT_LANES)
+        open |= (uint32_t)(vm_bits(vf_lt(vf_load(tile->from + at), vf_load(tile->to + at))) != 0) << at / PT_SOFT_GROUP;
+    return open;
+}
+
+static inline void pt_soft_draw_discs(struct pt_soft_tile *tile, struct pt_soft_order *order)
 {
     const struct soft_args *args = tile->bins->args;
-    struct pt_soft_disc discs[PT_LANES];
-    for (uint32_t i = 0; i < PT_SOFT_PIXELS; i++)
-        tile->front[i] = tile->weight[i] = tile->opacity[i] = 0.0f;
-    for (uint32_t i = 0; i < count; i += PT_LANES) {
-        const uint32_t some = pt_lanes_left(i, count);
-        pt_soft_set_discs(tile, list + i, some, discs);
-        if (!args->density && pt_soft_covered(tile, discs[0].z))
-            break;
-        for (uint32_t k = 0; k < some; k++)
-            pt_soft_add_splat(tile, &discs[k]);
+    const int counted = args->density != 0, splats = args->model != PT_SOFT_EXPRESS;
+    uint32_t open = pt_soft_open_groups(tile);
+    struct pt_soft_discs discs;
+    for (uint32_t i = 0; i < order->count && open; i += PT_SOFT_TAKEN) {
+        vf fragments = vf_zero();
+        float lanes[PT_LANES];
+        pt_soft_take(tile, order, i, open, &discs);
+        for (uint32_t left = open; left; left &= left - 1) {
+            const uint32_t group = (uint32_t)__builtin_ctz(left);
+            int more = 1;
+            if (!discs.reaching[group])
+                continue;
+            if (splats)
+                more = counted ? pt_soft_add_splats(tile, &discs, group, 1, &fragments)
+                               : pt_soft_add_splats(tile, &discs, group, 0, &fragments);
+            else if (counted || !discs.plain)
+                more = pt_soft_add_discs(tile, &discs, group, counted, 0, &fragments);
+            else
+                more = pt_soft_add_discs(tile, &discs, group, 0, 1, &fragments);
+            if (!more)
+                open &= ~(1u << group);
+        }
+        vf_store(lanes, fragments);
+        for (uint32_t k = 0; k < PT_LANES; k++)
+            tile->fragments += (uint32_t)lanes[k];
     }
+}
+
+// Splats, One Layer: the mean of what a pixel's surface is made of.
+static inline void pt_soft_mean(struct pt_soft_tile *tile)
+{
+    const uint32_t model = tile->bins->args->model;
     for (uint32_t i = 0; i < PT_SOFT_PIXELS; i++) {
         if (!(tile->weight[i] > 0.0f))
             continue;
         const float share = 1.0f / tile->weight[i];
-        const float opacity = args->model == PT_SOFT_SPLATS ? 1.0f : tile->opacity[i] * share, scale = opacity * share;
+        const float opacity = model == PT_SOFT_SPLATS ? 1.0f : tile->opacity[i] * share, scale = opacity * share;
         for (int k = 0; k < 3; k++)
             tile->color[k][i] = tile->color[k][i] * scale;
         tile->through[i] = 1.0f - opacity;
     }
+}
+
+static void pt_soft_tile_discs(struct pt_soft_tile *tile, struct pt_soft_order *order)
+{
+    if (tile->bins->args->model == PT_SOFT_EXPRESS) {
+        pt_soft_draw_discs(tile, order);
+        return;
+    }
+    memset(tile->front, 0, sizeof tile->front);
+    memset(tile->weight, 0, sizeof tile->weight);
+    memset(tile->opacity, 0, sizeof tile->opacity);
+    pt_soft_draw_discs(tile, order);
+    pt_soft_mean(tile);
 }
 
 #endif
