@@ -25,6 +25,10 @@ struct pt_chunk {
     uint32_t shapes[8];     // of its points, drawn or not: bit c % 32 of word c / 32: the byte c from PT_SHAPE_SIGHT_SHIFT on
     float reach, footprint; // greatest half axis of its points' footprints, and their 90th percentile; 0: not analysed
     float built;            // the spacing as the cloud was built with it, whatever an analysis found: range images go by it
+    // Of a cloud in levels: about how far apart the points of this chunk and of all coarser ones that reach over its box lie, taken
+    // together. The next finer chunks halve it: a level holds four times the points of the one before it. 0: the cloud has one level.
+    // `spacing` and `built` are those of the whole cloud there, whatever the level.
+    float gap;
 };
 
 // Whether a cloud still lives, shared with the devices that hold its buffers.

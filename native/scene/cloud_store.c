@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SECTION = 1 << 16, VERSION = 9, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
+enum { SECTION = 1 << 16, VERSION = 10, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
 static const char magic[8] = {'p', 'a', 't', 'i', 'n', 'a', '\n', '\x1a'};
 
 struct header {
@@ -188,7 +188,8 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
     uint64_t next = 0, drawn = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
-        double sum = (double)chunk->spacing + (double)chunk->reach + (double)chunk->footprint + (double)chunk->built;
+        double sum = (double)chunk->spacing + (double)chunk->reach + (double)chunk->footprint + (double)chunk->built +
+                     (double)chunk->gap;
         for (int k = 0; k < 3; k++)
             sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] + (double)chunk->cone_axis[k];
         if (chunk->first != next || !chunk->count || chunk->count > chunk->padded || chunk->padded % PT_CHUNK_ALIGN ||
