@@ -393,8 +393,8 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_wall),    cmocka_unit_test(test_glass), cmocka_unit_test(test_threads), cmocka_unit_test(test_regions),
-        cmocka_unit_test(test_devices), cmocka_unit_test(test_parts),
+        cmocka_unit_test(test_wall),    cmocka_unit_test(test_glass),   cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_regions), cmocka_unit_test(test_devices), cmocka_unit_test(test_parts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
