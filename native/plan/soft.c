@@ -315,6 +315,11 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
     else
         pt_plan_recolor(builder, instance, &args.shade);
     args.shade.light_count = args.shade.instance.lit ? args.shade.light_count : 0;
+    const struct pt_soft_code code = pt_soft_code(
+        instance->instance->cloud, style->soft == PATINA_SOFT_FIELD ? style->field : NULL, style->soft_radius > 0.0f);
+    args.whole = code.whole;
+    args.radius_base = code.base;
+    args.radius_step = code.step;
     const enum pt_late late = pt_shade_late(&args.shade, PT_LATE_POINTS);
     args.threshold = style->soft == PATINA_SOFT_FIELD ? pt_field_steps(style->soft_threshold) : 0;
     if (style->soft_modulation > 0.0f) // without a field all is 1

@@ -80,7 +80,7 @@ static int bind_field(struct pt_binder *binder, const struct pt_instance *instan
         return error;
     struct pt_resident *holder = field ? bound->field : bound->cloud;
     *out = &holder->fields[one];
-    return pt_residency_field(binder->device, instance->cloud, field ? field->steps : NULL, holder, one);
+    return pt_residency_field(binder->device, instance->cloud, field, holder, one);
 }
 
 // Colours: the cloud's own, with what stations saw through in magenta, or graded.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "residency.h"
 
+#include "scene/mask.h"
 #include "scene/soft.h"
 
 #include <stdlib.h>
@@ -170,9 +171,10 @@ int pt_residency_mark(struct patina_device *device, const struct patina_cloud *c
     return error;
 }
 
-int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, const uint16_t *steps,
+int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, const struct patina_field *by,
                        struct pt_resident *resident, int one)
 {
+    const struct pt_soft_code code = pt_soft_code(cloud, by, one);
     struct pt_buffer *field = &resident->fields[one];
     const uint32_t shapes = atomic_load(&cloud->alive->shapes);
     if (field->size && (one || resident->field_shapes == shapes))
@@ -184,7 +186,7 @@ int pt_residency_field(struct patina_device *device, const struct patina_cloud *
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t slot = chunk->first; slot < chunk->first + chunk->padded; slot++)
-            words[slot] = pt_soft_word(steps ? steps[slot] : (uint32_t)PT_FIELD_MOST,
+            words[slot] = pt_soft_word(code, by ? by->steps[slot] : (uint32_t)PT_FIELD_MOST,
                                        one ? 1.0f : pt_soft_radius(cloud, chunk, slot));
     }
     const int error = device->ops->buffer_create(device, cloud->slots * sizeof *words, words, 0, field);

@@ -31,8 +31,8 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
 int pt_residency_mark(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
 // Makes resident->buffers[PT_SIGHTS] what the cloud's stations saw.
 int pt_residency_see(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
-// Makes resident->fields[one] what the cloud's points are as soft ones: by a field's steps, or all of them (NULL).
-int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, const uint16_t *steps,
+// Makes resident->fields[one] what the cloud's points are as soft ones: by a field, or all of them (NULL).
+int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, const struct patina_field *by,
                        struct pt_resident *resident, int one);
 // Likewise of what a mask or a grade holds: `size` bytes that live as long as `alive` says, in buffers[0], or none.
 int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive,

@@ -11,6 +11,7 @@
 #include "fingerprint.h"
 #include "base/elementary.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -215,6 +216,17 @@ static struct patina_field *field_begin(const patina_cloud *cloud)
     return NULL;
 }
 
+static void range_radii(const struct patina_cloud *cloud, float range[2])
+{
+    for (uint64_t slot = 0; cloud->radii && slot < cloud->slots; slot++) {
+        const float own = fminf(cloud->radii[slot], FLT_MAX); // a damaged file may hold any
+        if (!(own > 0.0f))
+            continue;
+        range[0] = range[1] > 0.0f ? fminf(range[0], own) : own;
+        range[1] = fmaxf(range[1], own);
+    }
+}
+
 static int fill_field(struct fill *fill, patina_progress *progress)
 {
     const struct patina_cloud *cloud = fill->cloud;
@@ -233,6 +245,7 @@ static int fill_field(struct fill *fill, patina_progress *progress)
     }
     if (!error) {
         pt_parallel(pool, cloud->chunk_count, 4, fill_chunks, fill);
+        range_radii(cloud, fill->field->radii);
         fill->field->hash = pt_fingerprint(1, fill->field->steps, fill->field->slots * sizeof *fill->field->steps);
     }
     pt_pool_destroy(pool);

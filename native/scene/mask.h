@@ -37,6 +37,7 @@ struct patina_field {
     uint16_t (*chunks)[2]; // least and greatest of each
     uint64_t hash;         // of the steps
     double range[2];       // numbers that are 0 and 1
+    float radii[2];        // the least and the greatest of the points' own above 0; 0 and 0: there are none
     _Atomic uint64_t histogram[PT_FIELD_BINS];
 };
 

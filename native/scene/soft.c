@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "soft.h"
+#include "mask.h"
 #include "shared/words.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -11,7 +13,7 @@
 // Else it is the chunk's, but for the steps of its class.
 #define WIDEST 2.0
 #define CLASS 1.2
-#define ROUNDED 1.004 // by pt_soft_word
+#define ROUNDED 1.004 // by pt_soft_word, at most
 
 static double widest(const struct patina_cloud *cloud) { return cloud->shapes ? WIDEST : CLASS; }
 
@@ -30,10 +32,28 @@ double pt_soft_reach(const struct patina_cloud *cloud, const struct pt_chunk *ch
            (cloud->radii ? (double)cloud->info.radius_most : widest(cloud) * RADIUS_SPACINGS * (double)chunk->spacing);
 }
 
-uint32_t pt_soft_word(uint32_t step, float radius)
+static uint32_t bits_of(float radius)
 {
     uint32_t bits;
     memcpy(&bits, &radius, sizeof bits);
-    bits = bits < 0x7F7FC000u ? bits + 0x4000u : 0x7F7F8000u;
-    return step << PT_FIELD_SHIFT | (bits >> 15 & PT_FIELD_RADIUS);
+    return bits;
+}
+
+struct pt_soft_code pt_soft_code(const struct patina_cloud *cloud, const struct patina_field *field, int one)
+{
+    if (one || !cloud->radii || (field && !(field->radii[1] > 0.0f)))
+        return (struct pt_soft_code){.step = 1u << 15};
+    if (!field)
+        return (struct pt_soft_code){.whole = 1, .step = 1};
+    const uint32_t least = bits_of(field->radii[0]), step = (bits_of(field->radii[1]) - least) / (PT_FIELD_RADIUS - 1) + 1;
+    return (struct pt_soft_code){.base = least - step, .step = step}; // the least is 1, not 0
+}
+
+uint32_t pt_soft_word(struct pt_soft_code code, uint32_t f, float radius)
+{
+    const uint32_t bits = radius > 0.0f ? bits_of(fminf(radius, FLT_MAX)) : 0;
+    if (code.whole)
+        return bits;
+    const uint32_t steps = bits ? (bits - code.base + code.step / 2) / code.step : 0;
+    return f << PT_FIELD_SHIFT | (steps < PT_FIELD_RADIUS ? steps : PT_FIELD_RADIUS);
 }

@@ -14,7 +14,7 @@ layout(std430, binding = BIND_arguments) readonly buffer arguments_block {
     shade_args args; // struct gather_args
     uint threshold;
     float weight, radius_scale, opacity_scale;
-    uint within, sifted;
+    uint within, sifted, whole, radius_base, radius_step;
 };
 layout(std430, binding = BIND_points) writeonly buffer points_block { vec4 records[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
@@ -37,10 +37,19 @@ layout(location = 1) uniform uint first_slot;  // where the bound part of positi
 #include "lib/recolor.glsl"
 
 struct point {
-    float x, y, z, radius; // as in a record
+    float x, y, z, radius; // as in a record; before it has a place, the point's own
     float opacity;
-    uint field, id;
+    uint f, id;
 };
+
+// What its word holds; whether it is soft.
+bool read_word(uint word, inout point p)
+{
+    uint steps = whole != 0u ? word : word & PT_FIELD_RADIUS;
+    p.f = whole != 0u ? uint(PT_FIELD_MOST) : word >> PT_FIELD_SHIFT;
+    p.radius = pt_float(steps == 0u ? 0u : radius_base + steps * radius_step);
+    return threshold < p.f;
+}
 
 // 1. Where it lies, and whether it is soft, drawn and in view.
 bool place(chunk_view chunk, uint i, inout point p)
@@ -51,7 +60,7 @@ bool place(chunk_view chunk, uint i, inout point p)
     precise float x = (((chunk.lo[0] + chunk.row[0] * q.x) + chunk.row[1] * q.y) + chunk.row[2] * q.z) + chunk.hi[0];
     precise float y = (((chunk.lo[1] + chunk.row[3] * q.x) + chunk.row[4] * q.y) + chunk.row[5] * q.z) + chunk.hi[1];
     precise float z = (((chunk.lo[2] + chunk.row[6] * q.x) + chunk.row[7] * q.y) + chunk.row[8] * q.z) + chunk.hi[2];
-    precise float own = pt_float((p.field & PT_FIELD_RADIUS) << 15) * radius_scale;
+    precise float own = p.radius * radius_scale;
     own = pt_min(own, PT_SOFT_WIDEST);
     precise float least = pt_footprint(view, z) * PT_SOFT_LEAST;
     float radius = pt_max(own, least), reach = within != 0u ? radius : 0.0;
@@ -114,11 +123,11 @@ float opacity_of(uint id)
 }
 
 // 3. W of [S Eq. 22] in the lowest byte, and opacity above it.
-uint amount(uint word, float opacity)
+uint amount(uint f, float opacity)
 {
     precise float share = 1.0;
     if (weight > 0.0) {
-        precise float above = float((word >> PT_FIELD_SHIFT) - threshold) * weight;
+        precise float above = float(f - threshold) * weight;
         share = pt_min(pt_max(above, 0.0), 1.0);
     }
     precise float low = share * 255.0 + 0.5;
@@ -135,10 +144,9 @@ void main()
         vec4 first = vec4(none), second = vec4(none);
         point p;
         p.id = chunk.first + i;
-        p.field = field[p.id];
-        if (i < chunk.count && threshold < p.field >> PT_FIELD_SHIFT && place(chunk, i, p)) {
+        if (i < chunk.count && read_word(field[p.id], p) && place(chunk, i, p)) {
             precise float opacity = p.opacity * opacity_of(p.id);
-            uint word = amount(p.field, opacity);
+            uint word = amount(p.f, opacity);
             if (word >> PT_SOFT_SHIFT != 0u) {
                 first = vec4(p.x, p.y, p.z, p.radius);
                 second = vec4(light(p), pt_float(word));

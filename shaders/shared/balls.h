@@ -89,6 +89,8 @@ struct gather_args {
     float opacity;           // at the centre, times the instance's and the point's
     uint32_t within;         // 1: balls whose centre is nearer than z_near, or beyond z_far, may show
     uint32_t sifted;         // as in scatter_args
+    uint32_t whole;          // 1: words are radii alone
+    uint32_t radius_base, radius_step; // how they are read (shared/words.h)
 };
 
 #endif

@@ -67,8 +67,8 @@
 #define PT_SIGHT_LEAST 1e-18f // a place nearer to a station than this, or farther than PT_SIGHT_FARTHEST, was not looked through
 #define PT_SIGHT_FARTHEST 1e18f
 
-// The field word of a point: F in steps of 1/65535 in the upper half, the radius of its ball, object units, in the lower: bits
-// 15 to 30 of a float.
+// The field word of a point: F in steps of 1/65535 in the upper half, and in the lower the radius of its ball, object units: 0, or a
+// number k above, of the float whose bits are radius_base + k radius_step. Where all points are soft, the word is k, and F is 1.
 #define PT_FIELD_SHIFT 16
 #define PT_FIELD_RADIUS 0xFFFFu
 #define PT_FIELD_MOST 65535.0f

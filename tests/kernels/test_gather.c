@@ -18,12 +18,17 @@ struct setup {
     uint8_t *opacities;
 };
 
+static uint32_t float_bits(double number)
+{
+    const float cut = (float)number;
+    uint32_t bits;
+    memcpy(&bits, &cut, 4);
+    return bits;
+}
+
 static uint32_t field_word(double f, double radius)
 {
-    const float number = (float)radius;
-    uint32_t bits;
-    memcpy(&bits, &number, 4);
-    return (uint32_t)(f * (double)PT_FIELD_MOST + 0.5) << PT_FIELD_SHIFT | (bits >> 15 & PT_FIELD_RADIUS);
+    return (uint32_t)(f * (double)PT_FIELD_MOST + 0.5) << PT_FIELD_SHIFT | (float_bits(radius) >> 15 & PT_FIELD_RADIUS);
 }
 
 static void set_lights(struct rng *rng, struct shade_args *args, uint32_t count)
@@ -59,7 +64,8 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, ui
                                   .threshold = 20000,
                                   .radius_scale = 1.25f,
                                   .opacity = 0.8f,
-                                  .within = 1};
+                                  .within = 1,
+                                  .radius_step = 1u << 15};
     s.args.shade.world[0] = s.args.shade.world[1] = s.args.shade.world[2] = 0.5f;
     *instance = (struct instance_args){.id_base = 70,
                                        .id_count = cloud->slots,
@@ -212,6 +218,26 @@ static void radii(struct harness *h)
     }
 }
 
+// Words that are radii alone, and steps between two of them; 0 is none.
+static void words(struct harness *h)
+{
+    for (uint32_t whole = 0; whole < 2; whole++) {
+        struct rng rng = {81 + whole};
+        struct setup s = make(h, &rng, 1, 2, 4.0, 0.05, 0.3);
+        set_lights(&rng, &s.args.shade, 1);
+        points_pad(&s.scene.clouds[0]);
+        s.args.whole = whole;
+        s.args.radius_step = whole ? 1 : (float_bits(0.3) - float_bits(0.05)) / (PT_FIELD_RADIUS - 1) + 1;
+        s.args.radius_base = whole ? 0 : float_bits(0.05) - s.args.radius_step;
+        s.args.weight = whole ? 1e-5f : 1.0f / 30000.0f;
+        for (uint32_t i = 0; i < s.scene.clouds[0].slots; i++) {
+            s.field[i] = whole ? float_bits(rng_range(&rng, 0.05, 0.3)) : (uint32_t)rng_next(&rng);
+            s.field[i] = i % 9 ? s.field[i] : whole ? 0 : s.field[i] & ~PT_FIELD_RADIUS;
+        }
+        HARNESS_CHECK(h, run(h, &s) > 100);
+    }
+}
+
 // The eye stands among the points; many lie behind it, some balls around it. Without `within` only those before it show.
 static void about_the_eye(struct harness *h)
 {
@@ -262,11 +288,9 @@ static void ends(struct harness *h)
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"formats of colours", formats, 0},
-        {"unlit, directed", unlit_and_directed, 0},
-        {"radii from 1e-3 to 1e3", radii, 0},
-        {"about the eye", about_the_eye, 0},
-        {"ends", ends, 0},
+        {"formats of colours", formats, 0},   {"unlit, directed", unlit_and_directed, 0},
+        {"radii from 1e-3 to 1e3", radii, 0}, {"words", words, 0},
+        {"about the eye", about_the_eye, 0},  {"ends", ends, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

@@ -22,13 +22,14 @@ static enum ref_truth both(enum ref_truth a, enum ref_truth b)
     return a == REF_NO || b == REF_NO ? REF_NO : a == REF_YES && b == REF_YES ? REF_YES : REF_UNSURE;
 }
 
-static double field_radius(uint32_t word)
+static double field_radius(const struct gather_args *args, uint32_t word)
 {
+    const uint32_t steps = args->whole ? word : word % 65536u;
     const union {
         uint32_t word;
         float number;
-    } half = {(word & PT_FIELD_RADIUS) << 15};
-    return (double)half.number;
+    } of = {args->radius_base + steps * args->radius_step};
+    return steps ? (double)of.number : 0.0;
 }
 
 // The light on it: shade's, of a pixel whose ray is the point's.
@@ -80,7 +81,7 @@ struct ref_record ref_gather(const struct gather_args *args, const struct chunk_
 {
     const struct view_args *view = &args->shade.view;
     const struct instance_args *instance = &args->shade.instance;
-    const uint32_t id = chunk->first + slot, f = field[id] >> PT_FIELD_SHIFT;
+    const uint32_t id = chunk->first + slot, f = args->whole ? 65535u : field[id] >> PT_FIELD_SHIFT;
     struct ref_record out = {.drawn = REF_NO};
     if (slot >= chunk->count || f <= args->threshold)
         return out;
@@ -92,7 +93,7 @@ struct ref_record ref_gather(const struct gather_args *args, const struct chunk_
     for (int k = 0; k < 3; k++)
         out.place[k] = project(chunk, k, p, &out.place_error[k]);
     // 1. its ball
-    const double own = fmin(field_radius(field[id]) * (double)args->radius_scale, (double)PT_SOFT_WIDEST);
+    const double own = fmin(field_radius(args, field[id]) * (double)args->radius_scale, (double)PT_SOFT_WIDEST);
     const double least = fmax(ref_footprint(view, out.place[2]) * (double)PT_SOFT_LEAST, -1.0);
     out.radius = fmax(own, least);
     out.radius_error = 4.0 * TOL_UNIT * fabs(out.radius) +

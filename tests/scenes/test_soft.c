@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BALLS = 10 };
+enum { BALLS = 12 };
 
 struct ball {
     double center[3], r, a;
@@ -34,14 +34,16 @@ static struct scene scene_at(int which)
         scene.name = "two";
         scene.count = 2;
         scene.balls[1] = (struct ball){{0.5, 0.8, 0.25}, 1.25, 0.6, {0.0f, 0.2f, 1.0f}};
-    } else if (which == 2) {
-        scene.name = "ten";
-        scene.count = BALLS;
-        for (int i = 0; i < BALLS; i++)
+    } else if (which == 2 || which == 4) {
+        scene.name = which == 2 ? "ten" : "ten of a field, its radii 1e-3 to 1e3";
+        scene.count = which == 2 ? 10 : 12;
+        for (int i = 0; i < 10; i++)
             scene.balls[i] = (struct ball){{0.4 * sin(i), -1.6 + 0.4 * i, 0.4 * cos(2.0 * i)},
-                                           0.5 + 0.0625 * i,
+                                           0.5 + 0.0631 * i,
                                            0.05 + 0.09 * i,
                                            {(float)(i % 2), 0.5f * (float)(i % 3), 0.25f * (float)(i % 5)}};
+        for (int i = 10; i < 12; i++) // what is not there widens the field's steps
+            scene.balls[i] = (struct ball){.r = i == 10 ? 1e-3 : 1e3};
     } else if (which == 3) {
         scene.name = "the eye inside";
         scene.eye[1] = -0.4;
@@ -179,6 +181,15 @@ static void hold(patina_device *device, const char *device_name, int which, int 
     patina_cloud_style style = soft_style(model);
     style.soft_shells = model == PATINA_SOFT_CONCENTRIC ? 12 : 0;
     style.soft_modulation = modulation;
+    patina_field *field = NULL;
+    if (which == 4) {
+        static const float one[] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+        const patina_field_desc desc = {.struct_size = sizeof desc, .values = one, .count = 12, .range = {0.0, 1.0}};
+        CHECK(patina_field_create(cloud, &desc, NULL, &field), NULL);
+        style.soft = PATINA_SOFT_FIELD;
+        style.field = field;
+        style.soft_threshold = 0.5f;
+    }
     patina_scene *drawn = scene_of(cloud, &style);
     const patina_camera camera = camera_of(&scene, parallel, s);
     const patina_settings settings = plain_settings();
@@ -208,12 +219,13 @@ static void hold(patina_device *device, const char *device_name, int which, int 
     assert_int_equal(picture_count(&picture), 0); // keys tell of what is opaque
     picture_free(&picture);
     patina_scene_destroy(drawn);
+    patina_field_destroy(field);
     patina_cloud_destroy(cloud);
 }
 
 static void hold_all(patina_device *device, const char *name)
 {
-    static const double scales[] = {1.0, 0x1p-10, 0x1p10}; // radii stay what a field holds
+    static const double scales[] = {1.0, 1e-3, 1e3};
     for (int which = 0; which < 4; which++)
         for (uint32_t model = 0; model < 3; model++) {
             hold(device, name, which, 0, model, 1.0, 0.0f);
@@ -221,6 +233,7 @@ static void hold_all(patina_device *device, const char *name)
         }
     for (int k = 1; k < 3; k++)
         hold(device, name, 2, 0, PATINA_SOFT_BASE, scales[k], 0.0f);
+    hold(device, name, 4, 0, PATINA_SOFT_BASE, 1.0, 0.0f);
     hold(device, name, 1, 0, PATINA_SOFT_BASE, 1.0, 0.6f);
     hold(device, name, 1, 0, PATINA_SOFT_EXPRESS, 1.0, 1.0f);
 }

@@ -12,11 +12,21 @@ struct gather {
 
 // PT_LANES points from slot i of the chunk on.
 struct points {
-    vf x, y, z, radius; // as in a record
+    vf x, y, z, radius; // as in a record; before it has a place, the point's own
     vf opacity;
-    vi field, id;
+    vi f, id;
     vm some;
 };
+
+// What their words hold; which of them are soft.
+static inline vm read_words(const struct gather_args *args, vi words, struct points *out)
+{
+    const vi steps = args->whole ? words : vi_and(words, vi_set(PT_FIELD_RADIUS)), none = vi_set(0);
+    const vi bits = vi_add(vi_set(args->radius_base), vi_mul(steps, vi_set(args->radius_step)));
+    out->f = args->whole ? vi_set((uint32_t)PT_FIELD_MOST) : vi_shr(words, PT_FIELD_SHIFT);
+    out->radius = vi_float(vi_select(vi_eq(steps, none), none, bits));
+    return vi_lt_unsigned(vi_set(args->threshold), out->f);
+}
 
 // 1. Where they lie, and which of them are soft, drawn and in view.
 static inline void place(const struct gather *gather, const struct chunk_view *chunk, uint32_t i, struct points *out)
@@ -30,9 +40,7 @@ static inline void place(const struct gather *gather, const struct chunk_view *c
     out->x = vf_transform(chunk, 0, p[0], p[1], p[2]);
     out->y = vf_transform(chunk, 1, p[0], p[1], p[2]);
     out->z = vf_transform(chunk, 2, p[0], p[1], p[2]);
-    const vf own = vf_min(vi_float(vi_mul(vi_and(out->field, vi_set(PT_FIELD_RADIUS)), vi_set(1u << 15))) *
-                              vf_set(args->radius_scale),
-                          vf_set(PT_SOFT_WIDEST));
+    const vf own = vf_min(out->radius * vf_set(args->radius_scale), vf_set(PT_SOFT_WIDEST));
     const vf least = vf_footprint(view, out->z) * vf_set(PT_SOFT_LEAST);
     out->radius = vf_max(own, least);
     const vf reach = args->within ? out->radius : vf_zero();
@@ -83,7 +91,7 @@ static inline vi amount(const struct gather_args *args, const struct points *poi
     const vf zero = vf_zero(), one = vf_set(1.0f), half = vf_set(0.5f);
     vf weight = one;
     if (args->weight > 0.0f) {
-        const vf above = vi_convert(vi_sub(vi_shr(points->field, PT_FIELD_SHIFT), vi_set(args->threshold)));
+        const vf above = vi_convert(vi_sub(points->f, vi_set(args->threshold)));
         weight = vf_min(vf_max(above * vf_set(args->weight), zero), one);
     }
     const vi low = vf_int(weight * vf_set(255.0f) + half);
@@ -111,10 +119,10 @@ static void gather_chunk(const struct gather *gather, const struct chunk_view *c
     float *records = (float *)PT_DATA(gather->call, gather, points) + (size_t)PT_SOFT_WORDS * chunk->record;
     const vf none = vf_set(pt_float(PT_KEY_EMPTY_Z));
     for (uint32_t i = 0; i < chunk->padded; i += PT_LANES) {
-        struct points points = {.field = vi_load(field + i), .id = vi_add(vi_set(chunk->first + i), vi_lanes())};
+        struct points points = {.id = vi_add(vi_set(chunk->first + i), vi_lanes())};
         vf first[4] = {none, none, none, none}, color[4] = {none, none, none, none};
         points.some = vm_first(i < chunk->count ? pt_lanes_left(i, chunk->count) : 0);
-        points.some = vm_and(points.some, vi_lt_unsigned(vi_set(args->threshold), vi_shr(points.field, PT_FIELD_SHIFT)));
+        points.some = vm_and(points.some, read_words(args, vi_load(field + i), &points));
         if (vm_bits(points.some))
             place(gather, chunk, i, &points);
         if (vm_bits(points.some)) {
