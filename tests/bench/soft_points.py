@@ -91,11 +91,15 @@ def table(found: dict[str, Any]) -> str:
 
 
 def text(quick: bool, _library: Path | None = None) -> str:
-    """Of the best that this processor has, and of AVX2."""
+    """Of the best that this processor has, and of AVX2 where that is another."""
     millions = [1.2] if quick else list(PRINTED)
-    parts = []
+    parts, described = [], set()
     for device in ("cpu", "cpu-avx2"):
         try:
+            description = native.Device(device, 2).description
+            if description in described:
+                continue
+            described.add(description)
             found = measure(device, millions)
         except native.PatinaError as error:
             parts.append(f"{device}: {error}")

@@ -43,12 +43,10 @@ def libraries() -> Path | str:
 
 
 def _cloud(radii: tuple[float, float], points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Radii as a soft point keeps its own: 9 bits."""
     random = np.random.default_rng(7)
     position = random.uniform(-1.0, 1.0, (points, 3)).astype(np.float32)
     least, most = np.log(radii)
-    radius = np.exp(random.uniform(least, most, points)).astype(np.float32)
-    return position, (radius.view(np.uint32) & np.uint32(0xFFFF8000)).view(np.float32)
+    return position, np.exp(random.uniform(least, most, points)).astype(np.float32)
 
 
 def _depths(position: np.ndarray, radius: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
