@@ -234,6 +234,22 @@ class MeshStyle(Descriptor):
                 ("alpha_least", c_float), ("exact", c_uint32)]
 
 
+class Page(Structure):
+    _fields_ = [("box_min", c_double * 3), ("box_max", c_double * 3), ("gap", c_double), ("count", c_uint32),
+                ("parent", c_uint32)]
+
+
+class PagesDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("pages", c_void_p), ("page_count", c_uint32), ("color_type", c_uint32),
+                ("has_normals", c_uint32), ("has_scalars", c_uint32), ("has_classes", c_uint32), ("box_min", c_double * 3),
+                ("box_max", c_double * 3), ("memory_cap", c_uint64)]
+
+
+class PagesInfo(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("points", c_uint64), ("arrived", c_uint64), ("pages", c_uint32),
+                ("pages_arrived", c_uint32), ("wanted", c_uint64), ("pages_wanted", c_uint32), ("returned", c_uint32)]
+
+
 class Part(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("part", c_uint32), ("of", c_uint32), ("behind", c_char_p), ("note", c_char_p)]
 
@@ -350,6 +366,11 @@ CALLS = {
     "patina_texture_create": (POINTER(TextureDesc), POINTER(c_void_p)),
     "patina_texture_destroy": (c_void_p,),
     "patina_scene_add_mesh": (c_void_p, c_void_p, POINTER(MeshStyle)),
+    "patina_cloud_pages_begin": (POINTER(PagesDesc), POINTER(c_void_p)),
+    "patina_cloud_page_give": (c_void_p, c_uint32, POINTER(CloudDesc)),
+    "patina_cloud_wanted": (c_void_p, c_double, c_void_p, c_uint32, c_void_p),
+    "patina_cloud_get_pages": (c_void_p, POINTER(PagesInfo)),
+    "patina_task_give_page": (c_void_p, c_uint32, POINTER(CloudDesc), POINTER(c_void_p)),
     "patina_frame_scatter": (c_void_p, c_void_p, POINTER(Part), c_char_p),
     "patina_frame_merge": (c_void_p, c_void_p, POINTER(c_void_p), c_uint32, c_char_p, c_void_p),
     "patina_keys_get_info": (c_char_p, POINTER(KeysInfo)),

@@ -3,6 +3,7 @@
 // concern: scene/cloud.c, scene/scene.c, io/file.c, task.c, error.c, log.c.
 #include "run/execute.h"
 #include "run/frame_samples.h"
+#include "scene/paged.h"
 #include "base/descriptor.h"
 #include "base/progress.h"
 #include "base/version.h"
@@ -143,8 +144,30 @@ static int take_turn(patina_frame *frame)
     return cancelled ? pt_fail(&frame->handle, PATINA_ERROR_CANCELLED, "rendering was cancelled") : PATINA_OK;
 }
 
-static int end_turn(patina_frame *frame, int error)
+// Of clouds whose points arrive page by page, what is there now is what the picture is of. renew: nobody's picture goes on yet.
+static void enter_clouds(const patina_scene *scene, int renew)
 {
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        pt_paged_enter(scene->instances[i].cloud, renew);
+}
+
+static void leave_clouds(const patina_scene *scene)
+{
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        pt_paged_leave(scene->instances[i].cloud);
+}
+
+static int begin_turn(patina_frame *frame, const patina_scene *scene, int renew)
+{
+    const int error = take_turn(frame);
+    if (!error)
+        enter_clouds(scene, renew);
+    return error;
+}
+
+static int end_turn(patina_frame *frame, const patina_scene *scene, int error)
+{
+    leave_clouds(scene);
     pt_mutex_lock(&frame->device->turns);
     frame->device->taken = 0;
     pt_condition_wake_all(&frame->device->changed);
@@ -156,16 +179,16 @@ int patina_frame_render(patina_frame *frame, const patina_scene *scene)
 {
     if (!frame || !scene)
         return fail("patina_frame_render: frame or scene is NULL");
-    int error = take_turn(frame);
-    return error ? error : end_turn(frame, pt_frame_render(frame, scene));
+    int error = begin_turn(frame, scene, 1);
+    return error ? error : end_turn(frame, scene, pt_frame_render(frame, scene));
 }
 
 int patina_frame_refine(patina_frame *frame, const patina_scene *scene, double ms)
 {
     if (!frame || !scene || isnan(ms))
         return fail("patina_frame_refine: frame or scene is NULL, or ms is not a number");
-    int error = take_turn(frame);
-    return error ? error : end_turn(frame, pt_frame_refine(frame, scene, ms));
+    int error = begin_turn(frame, scene, 0);
+    return error ? error : end_turn(frame, scene, pt_frame_refine(frame, scene, ms));
 }
 
 int patina_frame_scatter(patina_frame *frame, const patina_scene *scene, const patina_part *part, const char *path)
@@ -177,8 +200,8 @@ int patina_frame_scatter(patina_frame *frame, const patina_scene *scene, const p
     if (!error && (!checked.part || checked.part > checked.of || checked.of > 65536))
         error = pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_scatter: there is no part %u of %u", checked.part,
                         checked.of);
-    error = error ? error : take_turn(frame);
-    return error ? error : end_turn(frame, pt_frame_scatter(frame, scene, &checked, path));
+    error = error ? error : begin_turn(frame, scene, 1);
+    return error ? error : end_turn(frame, scene, pt_frame_scatter(frame, scene, &checked, path));
 }
 
 int patina_frame_merge(patina_frame *frame, const patina_scene *scene, const char *const *paths, uint32_t count,
@@ -189,8 +212,8 @@ int patina_frame_merge(patina_frame *frame, const patina_scene *scene, const cha
     for (uint32_t i = 0; i < count; i++)
         if (!paths[i])
             return fail("patina_frame_merge: a path is NULL");
-    int error = take_turn(frame);
-    return error ? error : end_turn(frame, pt_frame_merge(frame, scene, paths, count, next, round));
+    int error = begin_turn(frame, scene, 1);
+    return error ? error : end_turn(frame, scene, pt_frame_merge(frame, scene, paths, count, next, round));
 }
 
 int patina_keys_get_info(const char *path, patina_keys_info *info)
@@ -234,16 +257,16 @@ int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene)
 {
     if (!frame || !scene)
         return fail("patina_frame_bake_shadows: frame or scene is NULL");
-    int error = take_turn(frame);
-    return error ? error : end_turn(frame, pt_frame_bake(frame, scene));
+    int error = begin_turn(frame, scene, 1);
+    return error ? error : end_turn(frame, scene, pt_frame_bake(frame, scene));
 }
 
 int patina_frame_load_shadows(patina_frame *frame, const patina_scene *scene, const char *path)
 {
     if (!frame || !scene || !path)
         return fail("patina_frame_load_shadows: frame, scene or path is NULL");
-    int error = take_turn(frame);
-    return error ? error : end_turn(frame, pt_frame_load_shadows(frame, scene, path));
+    int error = begin_turn(frame, scene, 1);
+    return error ? error : end_turn(frame, scene, pt_frame_load_shadows(frame, scene, path));
 }
 
 int patina_frame_save_shadows(const patina_frame *frame, const char *path)
@@ -310,13 +333,19 @@ size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t s
 size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, char *buffer, size_t size)
 {
     struct pt_plan plan;
-    if (!frame || !scene || pt_plan_create(scene, &plan))
+    if (!frame || !scene)
         return 0;
+    enter_clouds(scene, 1);
+    if (pt_plan_create(scene, &plan)) {
+        leave_clouds(scene);
+        return 0;
+    }
     pt_plan_share_planes(&plan, pt_passes_together, frame->device, frame->planes.apart); // without memory it stays untold
     plan.mapped_cap = pt_pager_cap(frame->device, scene, &plan.round_bytes);
     plan.round_bytes = plan.mapped_cap ? plan.round_bytes : 0;
     size_t length = pt_plan_text(scene, &plan, buffer, size);
     pt_plan_destroy(&plan);
+    leave_clouds(scene);
     return length;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Picking: which points of an instance an outline on the picture holds, and pixels that show selected ones. Decided in float64, point
 // by point, in chunks that may have any; a row of pixels knows which edges of the outline cross it.
+#include "scene/paged.h"
 #include "run/frame.h"
 #include "base/descriptor.h"
 #include "base/progress.h"
@@ -336,7 +337,9 @@ static int run(struct pick *pick, const struct patina_frame *frame, struct pt_in
         error = pool ? make_outline(pick->desc, pick->scene->settings.height, &pick->outline) : PATINA_ERROR_MEMORY;
     if (!error) {
         pick->sieve = pt_sieve_make(pick->scene, pick->instance, PT_EVERY_POINT, room);
+        pt_paged_enter(cloud, 0);
         pt_parallel(pool, cloud->chunk_count, 4, pick_chunks, pick);
+        pt_paged_leave(cloud);
         error = pt_progress_cancelled(pick->progress) ? PATINA_ERROR_CANCELLED
                 : pick->done > cloud->chunk_count     ? PATINA_ERROR_MEMORY
                                                       : PATINA_OK;

@@ -27,8 +27,9 @@ struct patina_task {
     uint32_t read_count;
     double refine_ms;
     patina_cloud *painted; // the caller's
-    patina_cloud *cloud;   // built, until it is taken
-    char *path;            // its own copy
+    uint32_t page;
+    patina_cloud *cloud; // built, until it is taken
+    char *path;          // its own copy
     const patina_cloud *saved;
     patina_file *file; // opened, until it is taken
     patina_analysis_desc analyse;
@@ -89,6 +90,8 @@ static int build(struct patina_task *task) { return patina_cloud_create(&task->d
 
 static int paint(struct patina_task *task) { return patina_cloud_set_colors(task->painted, &task->color); }
 
+static int give_page(struct patina_task *task) { return patina_cloud_page_give(task->painted, task->page, &task->desc); }
+
 static int open_file(struct patina_task *task) { return patina_file_open(task->path, task->progress, &task->file); }
 
 static int save(struct patina_task *task) { return patina_cloud_save(task->saved, task->path); }
@@ -129,6 +132,15 @@ int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress, 
     if (!desc)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_build: desc is NULL");
     const int error = pt_take(NULL, "patina_task_build", desc, &task.desc, sizeof task.desc);
+    return error ? error : start(&task, out);
+}
+
+int patina_task_give_page(patina_cloud *cloud, uint32_t page, const patina_cloud_desc *desc, patina_task **out)
+{
+    struct patina_task task = {.work = give_page, .painted = cloud, .page = page};
+    if (!cloud || !desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_give_page: cloud or desc is NULL");
+    const int error = pt_take(NULL, "patina_task_give_page", desc, &task.desc, sizeof task.desc);
     return error ? error : start(&task, out);
 }
 

@@ -83,7 +83,12 @@ const char *pt_error_text(int error, char *buffer, size_t size); // buffer: wher
 // Large arrays come straight from the system: they go back to it when freed, and huge pages halve a scatter's TLB misses.
 // Zeroed, page-aligned. NULL when memory lacks. size 0 gives a valid pointer.
 void *pt_pages_alloc(size_t size);
-void pt_pages_free(void *pages, size_t size); // of pt_pages_alloc or pt_disk_map, NULL is fine; size as asked for
+// The same for arrays that are filled here and there: no more is taken than what is written to (Windows: is promised whole). What is
+// forgotten goes back to the system, but for what shares a page with its neighbours, and holds anything afterwards.
+void *pt_pages_reserve(size_t size);
+void pt_pages_forget(void *pages, size_t size);
+void pt_pages_free(void *pages,
+                   size_t size); // of pt_pages_alloc, pt_pages_reserve or pt_disk_map, NULL is fine; size as asked for
 // Of pt_disk_map, never written. What is returned is held no longer, and comes again from the file when it is read (macOS: it goes
 // first when memory lacks); others may read it meanwhile. What is expected is read soon: the disk may begin. Any part of a mapping.
 void pt_pages_return(void *pages, size_t size);

@@ -164,6 +164,27 @@ void *pt_pages_alloc(size_t size)
     return memory + before;
 }
 
+void *pt_pages_reserve(size_t size)
+{
+    void *memory = size > SIZE_MAX / 2 ? MAP_FAILED
+                                       : mmap(NULL, whole_pages(size), PROT_READ | PROT_WRITE,
+                                              MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    return memory == MAP_FAILED ? NULL : memory;
+}
+
+void pt_pages_forget(void *pages, size_t size)
+{
+    const uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE), first = ((uintptr_t)pages + page - 1) / page * page,
+                    end = ((uintptr_t)pages + size) / page * page;
+#ifdef __APPLE__
+    const int advice = MADV_FREE; // its own MADV_DONTNEED keeps them
+#else
+    const int advice = MADV_DONTNEED;
+#endif
+    if (end > first)
+        madvise((void *)first, end - first, advice);
+}
+
 void pt_pages_free(void *pages, size_t size)
 {
     if (pages)

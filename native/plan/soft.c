@@ -66,6 +66,9 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
     pt_chunk_translation(p->eye, object, chunk, translation);
     if (!pt_chunk_bounds(p->eye, chunk, rows, translation, reach, 1, &extent))
         return PATINA_OK;
+    const struct patina_cloud *cloud = out->instance->cloud;
+    if (!pt_plan_page(cloud, (uint32_t)(chunk - cloud->chunks), p->eye, object, &extent))
+        return PATINA_OK;
     for (int k = 0; k < 4; k++)
         extent.rect[k] += k < 2 ? -2.0 * (double)PT_SOFT_LEAST : 2.0 * (double)PT_SOFT_LEAST;
     const double pixel = (double)plan->view.footprint * (plan->view.perspective ? fabs(extent.z_beyond) : 1.0) *

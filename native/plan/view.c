@@ -204,6 +204,8 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (!pt_chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), 0,
                              &seen.extent))
             continue;
+        if (!pt_plan_page(cloud, c, camera, object, &seen.extent))
+            continue;
         double rim;
         const double stretch = stretch_of(camera, &seen.extent, &rim);
         for (int k = 0; k < 4; k++)

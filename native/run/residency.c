@@ -83,6 +83,7 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         if (error)
             return error;
     }
+    resident->pages = atomic_load(&cloud->alive->pages);
     int error = upload_shapes(device, cloud, resident);
     if (!error)
         error = upload_colors(device, cloud, resident);
@@ -94,6 +95,13 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
 // What changed since it was uploaded.
 static int renew(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
+    if (resident->pages != atomic_load(&cloud->alive->pages)) {
+        for (int i = 0; i < PT_INSTANCE_BUFFERS; i++)
+            device->ops->buffer_destroy(device, &resident->buffers[i]);
+        device->ops->buffer_destroy(device, &resident->fields[0]);
+        device->ops->buffer_destroy(device, &resident->fields[1]);
+        return upload(device, cloud, resident);
+    }
     int error = resident->shapes == atomic_load(&cloud->alive->shapes) ? PATINA_OK : upload_shapes(device, cloud, resident);
     if (error || resident->colors == atomic_load(&cloud->alive->colors))
         return error;

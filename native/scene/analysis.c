@@ -7,6 +7,7 @@
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "orient.h"
+#include "paged.h"
 #include "base/progress.h"
 #include "shared/words.h"
 
@@ -425,6 +426,10 @@ static int compute(struct walk *walk, struct pt_pool *pool)
 int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress,
                         struct pt_analysis *out)
 {
+    *out = (struct pt_analysis){0};
+    const int refused = pt_paged_refuse(cloud, "patina_cloud_analyse");
+    if (refused)
+        return refused;
     patina_analysis_desc checked = *desc;
     check_arrays(&checked); // checked already
     struct walk walk = {.cloud = cloud,

@@ -5,6 +5,7 @@
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "base/progress.h"
+#include "paged.h"
 #include "shared/discs.h"
 #include "shared/words.h"
 
@@ -84,6 +85,7 @@ struct build {
     struct patina_progress *progress;
     uint64_t *words, *scratch; // Morton code << 32 | id of the drawn points
     uint32_t drawn;
+    enum pt_build_kind kind;
     uint32_t cell_bits;  // the grid of cells has 2^cell_bits cells a side
     uint32_t *cells;     // first word of each cell, and one past the last
     uint32_t *begins;    // first word of each chunk
@@ -251,7 +253,7 @@ static int refine_range(struct build *build, uint32_t begin, uint32_t end, int d
 // a scan is sparse or has strays. 8 x 8 x 8 cells when they hold 256 points each on average, fewer for small clouds.
 static int find_cells(struct build *build)
 {
-    while (build->cell_bits < 3 && build->drawn >> (3 * build->cell_bits + 3) >= 256)
+    while (build->kind == PT_BUILD_FREELY && build->cell_bits < 3 && build->drawn >> (3 * build->cell_bits + 3) >= 256)
         build->cell_bits++;
     uint32_t count = 1u << 3 * build->cell_bits, shift = 62 - 3 * build->cell_bits;
     build->cells = malloc((count + 1) * sizeof *build->cells);
@@ -539,7 +541,8 @@ static int cut_chunks(struct build *build)
         for (uint32_t part = 0; part < parts; part++) {
             uint32_t first = (uint32_t)((uint64_t)count * part / parts);
             uint32_t last = (uint32_t)((uint64_t)count * (part + 1) / parts);
-            int error = cut_uneven(build, begin + first, last - first);
+            int error = build->kind == PT_BUILD_EVENLY ? add_chunk(build, begin + first, last - first)
+                                                       : cut_uneven(build, begin + first, last - first);
             if (error)
                 return error;
         }
@@ -636,14 +639,24 @@ static int check_desc(patina_cloud_desc *desc)
     return pt_check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 3, 4);
 }
 
+enum pt_color_format pt_color_format_of(uint32_t type)
+{
+    return type == PATINA_NONE ? PT_COLOR_NONE : type == PATINA_UINT8 ? PT_COLOR_SRGB8 : PT_COLOR_FLOAT;
+}
+
 static enum pt_color_format color_format(const patina_array *color)
 {
-    return !color->data ? PT_COLOR_NONE : color->type == PATINA_UINT8 ? PT_COLOR_SRGB8 : PT_COLOR_FLOAT;
+    return pt_color_format_of(color->data ? color->type : (uint32_t)PATINA_NONE);
 }
 
 int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progress, patina_cloud **out)
 {
-    struct build build = {.progress = progress};
+    return pt_cloud_build(given, PT_BUILD_FREELY, progress, out);
+}
+
+int pt_cloud_build(const patina_cloud_desc *given, enum pt_build_kind kind, patina_progress *progress, patina_cloud **out)
+{
+    struct build build = {.progress = progress, .kind = kind};
     if (!out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: out is NULL");
     *out = NULL;
@@ -655,16 +668,11 @@ int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progres
         return error;
 
     const patina_cloud_desc *desc = &build.desc;
-    struct patina_cloud *cloud = calloc(1, sizeof *cloud);
-    struct pt_alive *alive = calloc(1, sizeof *alive);
+    struct patina_cloud *cloud = pt_cloud_new();
     build.pool = pt_pool_create(pt_pool_threads_for(build.desc.threads, build.desc.count), 0);
     error = PATINA_ERROR_MEMORY;
-    if (cloud && alive && build.pool) {
-        pt_handle_init(&cloud->handle);
-        atomic_init(&alive->references, 1);
-        atomic_init(&alive->alive, 1);
+    if (cloud && build.pool) {
         cloud->threads = desc->threads;
-        cloud->alive = alive;
         cloud->info = (patina_cloud_info){.struct_size = sizeof cloud->info,
                                           .count = desc->count,
                                           .has_normals = desc->normal.data != NULL,
@@ -685,12 +693,7 @@ int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progres
     free(build.begins);
     pt_pool_destroy(build.pool);
     if (error) {
-        if (cloud && cloud->alive) {
-            patina_cloud_destroy(cloud);
-        } else {
-            free(cloud);
-            free(alive);
-        }
+        patina_cloud_destroy(cloud);
         return error == PATINA_ERROR_CANCELLED ? pt_fail(NULL, error, "building the cloud was cancelled")
                : error == PATINA_ERROR_TOO_MANY_POINTS
                    ? pt_fail(NULL, error, "a cloud of %llu points: too many, split it", (unsigned long long)desc->count)
@@ -735,8 +738,8 @@ int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_set_colors: bad arguments");
     struct build build = {.cloud = cloud, .desc = {.count = cloud->info.count, .color = *color}};
     const uint32_t types = 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32;
-    int error = pt_check_array(&build.desc.color, "color", types, 3, 4);
-    if (error)
+    int error = pt_paged_refuse(cloud, "patina_cloud_set_colors");
+    if (error || (error = pt_check_array(&build.desc.color, "color", types, 3, 4)))
         return pt_fail_again(&cloud->handle, error);
     error = replace_colors(&build);
     pt_pool_destroy(build.pool);
@@ -744,38 +747,4 @@ int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color)
     return error ? pt_fail(&cloud->handle, error, "new colours of %llu points: out of memory",
                            (unsigned long long)cloud->info.count)
                  : PATINA_OK;
-}
-
-void pt_alive_release(struct pt_alive *alive)
-{
-    if (atomic_fetch_sub(&alive->references, 1) == 1)
-        free(alive);
-}
-
-void patina_cloud_destroy(patina_cloud *cloud)
-{
-    if (!cloud)
-        return;
-    pt_pages_free(cloud->positions, cloud->slots * 12);
-    pt_pages_free(cloud->order, cloud->slots * 4);
-    pt_pages_free(cloud->surface, cloud->slots * 4);
-    pt_pages_free(cloud->colors, color_bytes(cloud));
-    pt_pages_free(cloud->opacities, opacity_bytes(cloud));
-    pt_pages_free(cloud->radii, cloud->slots * 4);
-    pt_pages_free(cloud->shapes, cloud->slots * 4);
-    pt_pages_free(cloud->scalars, pt_scalar_bytes(cloud));
-    pt_pages_free(cloud->classes, pt_class_bytes(cloud));
-    pt_sights_free(&cloud->sights);
-    free(cloud->chunks);
-    atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
-    pt_alive_release(cloud->alive);
-    pt_handle_destroy(&cloud->handle);
-    free(cloud);
-}
-
-int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info)
-{
-    if (!cloud)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_get_info: cloud is NULL");
-    return pt_give(&cloud->handle, "patina_cloud_get_info", &cloud->info, sizeof cloud->info, info);
 }

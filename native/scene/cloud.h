@@ -35,6 +35,7 @@ struct pt_chunk {
 struct pt_alive {
     atomic_int references, alive;
     atomic_uint colors;           // counts how often they and the scalars were set
+    atomic_uint pages;            // counts how often pages arrived: all arrays are others then
     atomic_uint shapes;           // counts how often surface words and shapes were
     _Atomic uint64_t fingerprint; // 0: nobody has asked for it yet
 };
@@ -71,16 +72,17 @@ struct patina_cloud {
     uint32_t chunk_count;
     uint32_t mapped; // bits 1 << pt_array: of points, pages of a file that nobody ever wrote to
     struct pt_chunk *chunks;
-    float *positions;   // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
-    uint32_t *order;    // slots: index in the caller's arrays
-    uint32_t *surface;  // slots: octahedral normal and spacing class (shared/words.h)
-    int beside;         // pt_shapes_beside
-    uint32_t *shapes;   // slots: footprint, thickness, kind (shared/words.h), or NULL where the cloud was not analysed
-    void *colors;       // slots x 3 uint8 (sRGB) or float (linear), or NULL
-    uint8_t *opacities; // slots, or NULL where every point is opaque
-    float *radii;       // slots, object units, or NULL
-    float *scalars;     // slots, or NULL
-    uint8_t *classes;   // slots, or NULL
+    struct pt_paged *paged; // of a cloud whose points arrive page by page (paged.h), else NULL
+    float *positions;       // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
+    uint32_t *order;        // slots: index in the caller's arrays
+    uint32_t *surface;      // slots: octahedral normal and spacing class (shared/words.h)
+    int beside;             // pt_shapes_beside
+    uint32_t *shapes;       // slots: footprint, thickness, kind (shared/words.h), or NULL where the cloud was not analysed
+    void *colors;           // slots x 3 uint8 (sRGB) or float (linear), or NULL
+    uint8_t *opacities;     // slots, or NULL where every point is opaque
+    float *radii;           // slots, object units, or NULL
+    float *scalars;         // slots, or NULL
+    uint8_t *classes;       // slots, or NULL
     uint64_t class_hash;
     enum pt_color_format color_format;
     uint32_t threads;        // at most, as the caller said; 0: not said
@@ -95,6 +97,13 @@ static inline uint32_t pt_number_of(const struct patina_cloud *cloud, uint64_t s
     const uint32_t number = cloud->order[slot], last = (uint32_t)cloud->info.count - 1;
     return number < last ? number : last;
 }
+
+// A cloud without points, whose fields are zero but for what any has; NULL without memory.
+struct patina_cloud *pt_cloud_new(void);
+// FREELY: as many chunks as the points' places ask for. EVENLY: as their number says, so that it is known before.
+enum pt_build_kind { PT_BUILD_FREELY, PT_BUILD_EVENLY };
+int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, patina_progress *progress, patina_cloud **out);
+enum pt_color_format pt_color_format_of(uint32_t type); // patina_type of a caller's colours
 
 // Points of a chunk that the first `strata` of PT_STRATA strata hold: every 2^(PT_STRATA - strata)-th in Morton order.
 uint32_t pt_chunk_prefix(const struct pt_chunk *chunk, uint32_t strata);

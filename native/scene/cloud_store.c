@@ -5,6 +5,7 @@
 #include "analysis.h"
 #include "cloud.h"
 #include "fingerprint.h"
+#include "paged.h"
 #include "base/platform.h"
 #include "base/progress.h"
 
@@ -162,10 +163,8 @@ int pt_cloud_writer_end(struct pt_cloud_writer *writer, const struct patina_clou
     return code;
 }
 
-int patina_cloud_save(const patina_cloud *cloud, const char *path)
+static int save(const patina_cloud *cloud, const char *path)
 {
-    if (!cloud || !path)
-        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save: bad arguments");
     struct patina_cloud copy = *cloud;
     struct pt_section sections[SECTIONS];
     struct pt_cloud_writer *writer;
@@ -176,6 +175,19 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
     for (int i = 0; i < SECTIONS; i++)
         pt_cloud_writer_add(writer, (enum pt_array)i, *sections[i].data, sections[i].size);
     return pt_cloud_writer_end(writer, cloud);
+}
+
+int patina_cloud_save(const patina_cloud *cloud, const char *path)
+{
+    if (!cloud || !path)
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save: bad arguments");
+    int error = pt_paged_refuse(cloud, "patina_cloud_save");
+    if (error)
+        return error;
+    pt_paged_enter(cloud, 1);
+    error = save(cloud, path);
+    pt_paged_leave(cloud);
+    return error;
 }
 
 // ---- open --------------------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 // classes, which can be hidden.
 #include "cloud.h"
 #include "fingerprint.h"
+#include "paged.h"
 #include "io/file.h"
 #include "base/compare.h"
 #include "base/platform.h"
@@ -92,8 +93,8 @@ int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar)
     if (!cloud || !scalar)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_set_scalars: bad arguments");
     patina_array checked = *scalar;
-    int error = pt_check_array(&checked, "scalar", NUMBERS, 1, 1);
-    if (error)
+    int error = pt_paged_refuse(cloud, "patina_cloud_set_scalars");
+    if (error || (error = pt_check_array(&checked, "scalar", NUMBERS, 1, 1)))
         return pt_fail_again(&cloud->handle, error);
     if (take_scalars(cloud, &checked))
         return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "scalars of %llu points: out of memory",

@@ -777,6 +777,7 @@ PATINA_API int patina_panorama_join_keys(const patina_panorama *panorama, const 
 // The rest of the manual, which this header includes.
 #include "files.h"
 #include "meshes.h"
+#include "pages.h"
 #include "parts.h"
 #include "points.h"
 #include "tasks.h"

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How a cloud's handle begins and ends, and what it tells.
+#include "cloud.h"
+#include "base/descriptor.h"
+#include "base/platform.h"
+#include "paged.h"
+
+#include <stdlib.h>
+
+struct patina_cloud *pt_cloud_new(void)
+{
+    struct patina_cloud *cloud = calloc(1, sizeof *cloud);
+    struct pt_alive *alive = calloc(1, sizeof *alive);
+    if (!cloud || !alive) {
+        free(cloud);
+        free(alive);
+        return NULL;
+    }
+    pt_handle_init(&cloud->handle);
+    atomic_init(&alive->references, 1);
+    atomic_init(&alive->alive, 1);
+    cloud->alive = alive;
+    return cloud;
+}
+
+void pt_alive_release(struct pt_alive *alive)
+{
+    if (atomic_fetch_sub(&alive->references, 1) == 1)
+        free(alive);
+}
+
+void patina_cloud_destroy(patina_cloud *cloud)
+{
+    if (!cloud)
+        return;
+    struct pt_section sections[PT_ARRAYS];
+    pt_cloud_sections(cloud, sections);
+    for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
+        pt_pages_free(*sections[i].data, sections[i].size);
+    pt_sights_free(&cloud->sights);
+    pt_paged_destroy(cloud);
+    free(cloud->chunks);
+    atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
+    pt_alive_release(cloud->alive);
+    pt_handle_destroy(&cloud->handle);
+    free(cloud);
+}
+
+int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info)
+{
+    if (!cloud)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_get_info: cloud is NULL");
+    return pt_give(&cloud->handle, "patina_cloud_get_info", &cloud->info, sizeof cloud->info, info);
+}
