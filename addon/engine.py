@@ -12,11 +12,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import cryptomatte, native, passes, render, sync, viewport
+from . import cryptomatte, native, passes, render, streaming, sync, viewport
 from .importers import told
 from .sync import losses, motion
 from .sync.kept import CHECKS
 
+ROUNDS = 8  # of a picture whose lights want further points
 BUILDING = 0.1  # share of the progress bar for reading the scene; the rest is the picture
 
 
@@ -144,10 +145,19 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         description = render.shifted(description, moment.shift)
         description = replace(description, settings=replace(description.settings, pixel_samples=moment.samples,
                                                             pixel_noise=sync.settings.noise(depsgraph.scene_eval)))
-        self._status("Rendering", BUILDING)
-        return description, render.draw(description, {item.plane for item in passes.enabled(depsgraph.view_layer_eval)},
-                                        self._poll_drawing, depsgraph.scene_eval.patina.tile_size,
-                                        show and (lambda planes: show(description, planes)))
+        planes, tile_size = {item.plane for item in passes.enabled(depsgraph.view_layer_eval)}, depsgraph.scene_eval.patina.tile_size
+        for stream in streaming.streams_of(item.cloud for item in description.clouds):
+            stream.try_again()
+        for _ in range(ROUNDS):
+            render.await_points(description, self._poll_reading, tile_size)
+            self._status("Rendering", BUILDING)
+            picture = render.draw(description, planes, self._poll_drawing, tile_size, show and (lambda planes: show(description, planes)))
+            if not render.wants_points(description):  # what lights see is known only then
+                break
+        lost = [losses.Loss(f"'{item.name}': {item.cloud.stream.message}") for item in description.clouds
+                if item.cloud.stream and item.cloud.stream.message]
+        losses.check(lost)
+        return replace(description, notices=[*description.notices, *lost]), picture
 
     def _go_to(self, frame: float) -> None:
         self.frame_set(math.floor(frame), frame - math.floor(frame))

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-from bpy.props import EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy.types import AddonPreferences, Context
 
 from . import memory, readers
@@ -61,6 +61,10 @@ class PatinaPreferences(AddonPreferences):
         description="Gigabytes that a final picture's planes may take before it is made in tiles")
     use_memory_limit: switch("memory_limit", 4, "A fixed number of gigabytes; else half of what is free", "Set Memory")
 
+    online: BoolProperty(
+        name="Allow Online Access", default=False,
+        description="Fetch points from addresses that you open. From Blender 4.2 on its own setting, under System, holds")
+
     def draw(self, _context: Context) -> None:
         from .operators import preferences as operators  # which needs these
         from .ui import rows
@@ -79,6 +83,8 @@ class PatinaPreferences(AddonPreferences):
         column.prop(self, "device")
         rows.automatic(column, self, "threads")
         rows.automatic(column, self, "memory_limit", text="Memory (GB)")
+        if not hasattr(bpy.app, "online_access"):
+            column.prop(self, "online")
         column = layout.column()
         lacking = readers.missing()
         if lacking:

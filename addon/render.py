@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import backdrop, cryptomatte, histogram, jobs, mattes, memory, native
+from . import backdrop, cryptomatte, histogram, jobs, mattes, memory, native, streaming
 from .pieces import LARGE_PICTURE, PIXEL_BYTES, Canvas, Piece, Planes, tiles
 from .sync import DeviceChoice, SceneDescription, edits, ranges, soft
 from .sync.analyzing import ANALYSES
@@ -207,6 +207,42 @@ def _draw_samples(device: native.Device, parts: list[tuple[SceneDescription, lis
         return Picture(finish(found), stats[0] | {"ms": sum(each["ms"] for each in stats),
                                                   "pixel_pending": max(each["pixel_pending"] for each in stats)},
                        device.label, notice)
+
+
+def await_points(description: SceneDescription, poll: Callable[[str, float], bool], tile_size: int = 0) -> None:
+    """Of clouds whose points are read as they are wanted: waits for all that the picture shows. poll(what, share) on this thread;
+    PatinaCancelled where it returns True."""
+    streams = streaming.streams_of(item.cloud for item in description.clouds)
+    if not streams:
+        return
+    device, most = device_for(description.device), 0
+    canvas = Canvas(description, tile_size, None)
+    with native.Frame(device) as frame:
+        while True:
+            for piece in canvas.pieces:
+                with native.Scene() as scene:
+                    describe(scene, piece.description, ["COMBINED"])
+                    frame.plan(scene)
+            if not wants_points(description):
+                return
+            while any(stream.busy for stream in streams):
+                for stream in streams:
+                    stream.advance()
+                coming = [stream.outlook() for stream in streams]
+                points, size = (sum(getattr(one, name) for one in coming) for name in ("points", "megabytes"))
+                most = max(most, points)
+                if poll(f"Fetching {points:,} points, {size:,.1f} MB", 1.0 - points / max(most, 1)):
+                    raise native.PatinaCancelled("cancelled", native.CANCELLED)
+                time.sleep(jobs.INTERVAL / 4)
+
+
+def wants_points(description: SceneDescription) -> bool:
+    """Whether pictures since the last call wanted points that are not there, and may come."""
+    found = False
+    for stream in streaming.streams_of(item.cloud for item in description.clouds):
+        stream.wish(0.0)
+        found |= stream.busy
+    return found
 
 
 def bake_shadows(description: SceneDescription, path: str) -> None:

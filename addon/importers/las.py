@@ -175,6 +175,15 @@ def _extra(record: bytes) -> Extra:
                  struct.unpack_from("<3d", record, 112), struct.unpack_from("<3d", record, 136))
 
 
+def is_copc(path: Path) -> int | None:
+    """How many points a COPC holds; None for other files."""
+    with open(path, "rb") as file:
+        head = file.read(429)
+    if len(head) < 429 or head[:4] != b"LASF" or head[377:381] != b"copc":
+        return None
+    return struct.unpack_from("<Q", head, 247)[0]
+
+
 def preview(path: Path) -> list[str]:
     header = read_header(path)
     size = header.upper - header.lower

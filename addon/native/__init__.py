@@ -48,6 +48,7 @@ __all__ = ["CANCELLED", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", 
 
 KINDS = tuple(abi.KIND)  # patina_kind
 WRAPS = tuple(abi.WRAP)  # patina_wrap
+NO_PAGE = 2 ** 32 - 1  # PATINA_NO_PAGE
 
 
 def _destroy(destroy: Callable[[c_void_p], None], handle: c_void_p, _keep: Any) -> None:
@@ -188,6 +189,7 @@ class Cloud(_Handle):
     scan_of: np.ndarray | None = None
     scan_stamp = 0
     color_stamp = 0
+    stream: Any = None  # of one whose points arrive page by page: streaming.Stream
     numbers: np.ndarray | None = None  # (count,) that points may be soft by, in the given order; whoever reads the points sets them, and
     numbers_stamp = 0  # counts how often they changed
     scan_name: str = ""
@@ -224,6 +226,40 @@ class Cloud(_Handle):
         _Handle.__init__(cloud, os.fsencode(path), create="patina_cloud_open")
         cloud._learn()
         return cloud
+
+    @classmethod
+    def begin(cls, boxes: np.ndarray, gaps: np.ndarray, counts: np.ndarray, parents: np.ndarray, color_type: str, scalars: bool,
+              classes: bool, box: tuple[Sequence[float], Sequence[float]], memory_cap: int = 0) -> Cloud:
+        """A cloud whose points arrive page by page: boxes (n, 6), lower corners first; parents' index or -1; color_type: of numpy,
+        "" without colors."""
+        pages = (abi.Page * len(gaps))()
+        values = np.frombuffer(pages, [("box", "f8", 6), ("gap", "f8"), ("count", "u4"), ("parent", "u4")])
+        values["box"], values["gap"], values["count"] = boxes, gaps, counts
+        values["parent"] = np.where(parents < 0, NO_PAGE, parents)
+        cloud = cls.__new__(cls)
+        _Handle.__init__(cloud, byref(abi.PagesDesc(
+            pages=ctypes.addressof(pages), page_count=len(gaps), color_type=TYPES.get(color_type, 0), has_scalars=scalars,
+            has_classes=classes, box_min=tuple(box[0]), box_max=tuple(box[1]), memory_cap=memory_cap)), create="patina_cloud_pages_begin")
+        cloud._learn()
+        return cloud
+
+    def start_page(self, page: int, positions: np.ndarray, colors: np.ndarray | None, scalars: np.ndarray | None,
+                   classes: np.ndarray | None) -> Task:
+        """A task that hands a page's points in; its result() raises PatinaError where they are not what was promised. At any time."""
+        arrays = (positions, None, colors, None, None, scalars, classes)
+        return Task("give_page", self._handle, page, byref(_describe(*arrays)), keep=(self, arrays))
+
+    def wanted(self, least_px: float, room: int) -> list[int]:
+        """Absent pages that pictures wanted since the last call, near and coarse ones first: their parents' gap is more pixels."""
+        found, count = (c_uint32 * room)(), c_uint32()
+        self._call("wanted", least_px, found, room, byref(count))
+        return list(found[:count.value])
+
+    def pages(self) -> dict[str, int]:
+        """The fields of patina_pages_info."""
+        info = abi.PagesInfo()
+        self._call("get_pages", byref(info))
+        return {name: getattr(info, name) for name, _ in abi.PagesInfo._fields_[1:]}
 
     @staticmethod
     def start_verifying(path: Path, progress: Progress | None = None) -> Task:
@@ -508,6 +544,10 @@ class Frame(_Handle):
         call, *how = ("render",) if refine_ms is None else ("refine", refine_ms)
         return Task(call, self._handle, scene._handle, *how, reads, len(reads),
                     keep=(self, self._device, scene, reads, pixels), finish=lambda task: pixels)
+
+    def plan(self, scene: Scene) -> None:
+        """Plans the picture without drawing it: clouds know then which pages it would want."""
+        library().patina_frame_plan_text(self._handle, scene._handle, None, 0)
 
     def refine(self, scene: Scene, ms: float) -> None:
         """Betters the picture by samples of the same scene until so many milliseconds have passed, for as long as stats() say

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from . import (
+    addresses,
     analyze,
     balance,
     clips,
@@ -29,7 +30,7 @@ from . import (
     world,
 )
 
-_MODULES = (analyze, balance, clips, colors, import_points, export_points, combine, farm, linked_points, plan, points, points_keys, points_tools, preferences,
+_MODULES = (addresses, analyze, balance, clips, colors, import_points, export_points, combine, farm, linked_points, plan, points, points_keys, points_tools, preferences,
             scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
 
 

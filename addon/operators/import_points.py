@@ -14,7 +14,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native, styles
 from ..importers import PointFile, name_of, origin, told
-from ..sync import files, linked, sequence
+from ..sync import addresses, clouds, files, linked, sequence
 from . import set_up, stations
 from .steps import Stepped
 
@@ -63,6 +63,13 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         name="Link", default=False,
         description="Keep the points out of Blender: the object is a box, Patina reads the file itself. For scans too large "
                     "for a mesh; the filters below do not apply")
+    stream: EnumProperty(
+        name="Read COPC", default='AUTO',
+        description="Of linked COPC files: as needed there is no conversion, and pictures fetch the points that they show",
+        items=(
+            ('AUTO', "Automatic", "As needed from 20 million points on", 0),
+            ('ON', "As Needed", "Without conversion, analysis and stations", 1),
+            ('OFF', "Whole", "Converted, analyzed and kept", 2)))
     sequence: BoolProperty(
         name="Sequence", default=False,
         description="Files in the same folder whose names differ by a number become one object, which shows one of them a "
@@ -87,9 +94,10 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         layout.prop(self, "frame")
         layout.prop(self, "stations")
         layout.prop(self, "link")
-        row = layout.row()
-        row.active = self.link
-        row.prop(self, "sequence")
+        column = layout.column()
+        column.active = self.link
+        column.prop(self, "stream")
+        column.prop(self, "sequence")
         column = layout.column()
         column.active = not self.link
         column.prop(self, "every")
@@ -184,11 +192,13 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
                 continue
             try:
                 spared = context.engine == set_up.PatinaRenderEngine.bl_idname and context.scene.patina.surface == 'RANGES'
-                source = linked.source(first, analyzed=name == first and not spared)  # of a sequence none is
+                streamed = name == first and self.stream != 'OFF' and addresses.is_streamed(first, self.stream)
+                source = linked.source(first, analyzed=name == first and not spared, streamed=streamed)  # of a sequence none is
                 if source is None:
                     raise native.PatinaError("there is no such file")
                 importers.reader(first)
                 found[name] = yield from linked.steps(source, self._progress.part(index, len(paths)))
+                clouds.CACHE.keep_streamed(source, found[name].cloud)
             except native.PatinaCancelled:
                 return self._ended([])
             except native.PatinaError as error:
@@ -201,6 +211,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box, item))
             files.assign(obj, files.as_preferred(path))
             obj.patina.sequence.start = context.scene.frame_start
+            obj.patina.stream = self.stream
             self._add(context, obj, item.origin, item.units)
         self._finish(context)
         count = sum(item.cloud.count for item in found.values())

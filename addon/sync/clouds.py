@@ -210,6 +210,11 @@ class CloudCache:
         self._keep(source.identity(), (), cloud)
         return cloud
 
+    def keep_streamed(self, source: linked.Source, cloud: native.Cloud) -> None:
+        """Of a file that was opened just now, and is read as pictures want it: its head need not be read again."""
+        if source.streamed:
+            self._keep(source.identity(), (), cloud)
+
     def obtain_readable(self, name: str, source: linked.Source, progress: Progress) -> Steps[tuple[native.Cloud | None, str]]:
         """The same; where the file cannot be read that of the last one before it in its sequence that can, or None; and what to say."""
         failed: Exception | None = None

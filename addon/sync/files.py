@@ -18,7 +18,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..importers.reading import told
-from . import kept, sequence
+from . import addresses, kept, sequence
 
 _TEXT = "linked_file"
 _unpacked: dict[tuple[int, int], Path] = {}  # of packed files, by place in memory and size
@@ -28,6 +28,9 @@ def assign(obj: bpy.types.Object, path: str) -> None:
     """The file, or pattern of files, that an object links from now on, absolute or as Blender writes relative ones; "": none."""
     group = obj.patina
     volume = group.linked_data
+    group.address = path if addresses.is_address(path) else ""
+    if group.address:
+        path = ""
     if not path:
         group.linked_data = None
         _stored(obj).pop(_TEXT, None)
@@ -56,10 +59,12 @@ def as_preferred(path: Path) -> str:
         return str(path)
 
 
-def path_of(obj: bpy.types.Object) -> Path | None:
-    """The file or pattern that an object links, absolute; of a packed one where it was put down. None: it links none."""
+def path_of(obj: bpy.types.Object) -> Path | addresses.Address | None:
+    """The file, pattern or address that an object links, absolute; of a packed one where it was put down. None: it links none."""
     original = obj.original
     volume = original.patina.linked_data
+    if original.patina.address:
+        return addresses.Address(original.patina.address)
     if volume is None:  # of an older version, and of a library
         text = text_of(original)
         return Path(bpy.path.abspath(text, library=original.library)) if text else None
@@ -87,6 +92,8 @@ def _put_down(packed: bpy.types.PackedFile, path: Path) -> Path:
 def text_of(obj: bpy.types.Object) -> str:
     """What linked_file says."""
     volume = obj.patina.linked_data
+    if obj.patina.address:
+        return obj.patina.address
     if volume is None:
         return _stored(obj).get(_TEXT, "")
     if not volume.is_sequence:
@@ -111,6 +118,7 @@ def _renew(*_) -> None:
 @persistent
 def _forget(*_) -> None:
     _unpacked.clear()
+    addresses.forget()
 
 
 _HANDLERS = ((bpy.app.handlers.load_pre, _forget), (bpy.app.handlers.load_post, _renew))

@@ -17,10 +17,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .. import importers, jobs, native, preferences
+from .. import importers, jobs, native, preferences, streaming
+from ..importers import crs
 from ..importers import scans as scans_of_files
 from ..importers.origin import PROPERTY
-from . import analysis, analyzing, attributes, files, kept, sequence
+from . import addresses, analysis, analyzing, attributes, files, kept, sequence
 from .colors import scalar_name
 from .losses import Loss
 from .soft import attribute_name
@@ -36,13 +37,14 @@ MOST_SCANS = 1024  # that the library grades
 class Source:
     """A file as it is now, and where its cloud is kept."""
 
-    path: Path
+    path: Path | addresses.Address
     kept: Path
     origin: Corner | None = None  # float64, that the cloud shall be relative to; None: the file's own
     scalar: str = ""  # that a ramp is laid over
     analyzed: bool = True
     hide_uncolored: bool = False
     pattern: Path | None = None  # of the sequence that it is of
+    streamed: bool = False  # a COPC whose points are read as pictures want them
 
     def identity(self) -> tuple:
         return ("linked", str(self.path), self.kept.name)
@@ -74,6 +76,12 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str], analyzed: b
     no harm."""
     path = files.path_of(obj)
     origin = pattern = None
+    if isinstance(path, addresses.Address):
+        return source(path, scalar=scalar_name(obj) or attribute_name(obj))
+    if obj.patina.stream != 'OFF' and not sequence.is_pattern(path) and addresses.is_streamed(path, obj.patina.stream):
+        found = source(path, scalar=scalar_name(obj) or attribute_name(obj), streamed=True)
+        if found:
+            return found
     if sequence.is_pattern(path):
         pattern = path
         settings = obj.patina.sequence
@@ -93,8 +101,10 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str], analyzed: b
     return found
 
 
-def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed: bool = True,
-           hide_uncolored: bool = False, pattern: Path | None = None) -> Source | None:
+def source(path: Path | addresses.Address, origin: Corner | None = None, scalar: str = "", analyzed: bool = True,
+           hide_uncolored: bool = False, pattern: Path | None = None, streamed: bool = False) -> Source | None:
+    if streamed or isinstance(path, addresses.Address):
+        return _streamed(path, scalar)
     try:
         status = path.stat()
     except OSError:
@@ -103,6 +113,18 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
     state = _hash(f"{status.st_size} {status.st_mtime_ns}", 6)
     variant = _hash(f"{scalar} {analyzed} {hide_uncolored}", 4)  # several objects may link one file
     return Source(path, kept.place_of(path, f"{place}-{state}-{variant}.cloud"), origin, scalar, analyzed, hide_uncolored, pattern)
+
+
+def _streamed(path: Path | addresses.Address, scalar: str) -> Source | None:
+    """Nothing is analyzed or kept of it."""
+    state = ""
+    if isinstance(path, Path):
+        try:
+            status = path.stat()
+        except OSError:
+            return None
+        state = f"{status.st_size} {status.st_mtime_ns}"
+    return Source(path, kept.folder() / f"{_hash(f'{path} {state} {scalar}', 16)}.pages", None, scalar, False, False, None, True)
 
 
 def before(found: Source) -> Source | None:
@@ -151,6 +173,8 @@ def load(source: Source, progress: importers.Progress | None = None) -> Linked:
 
 def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """The same in steps."""
+    if source.streamed:
+        return (yield from _stream(source, progress))
     notes = source.kept.with_suffix(".json")
     try:
         found = _linked(native.Cloud.open(source.kept), *kept.read_notes(notes), source.kept)
@@ -203,6 +227,22 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
     return _linked(cloud, origin, scanners, units, scans and asdict(scans), told, source.kept)
+
+
+def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
+    """The head of a COPC, whose points come later."""
+    if isinstance(source.path, addresses.Address):
+        addresses.check(source.path)
+    progress.doing = "Reading the octree"
+    stream = streaming.Stream(str(source.path), source.scalar)
+    try:
+        cloud = yield from stream.steps(lambda: progress.step(0.5))
+    except BaseException:
+        stream.close()
+        raise
+    units = crs.units(stream.wkt, {})
+    told = importers.reading.crs_notes(units).get("units")
+    return Linked(cloud, stream.origin, cloud.box, [], tuple(told or (1.0, 1.0)))
 
 
 def _tidy(newest: Path) -> None:

@@ -184,7 +184,11 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         column = layout.column()
         if patina.linked_file:
             held = patina.linked_data  # whose path is what holds
-            column.prop(held or patina, "filepath" if held else "linked_file", text="Linked File")
+            column.prop(held or patina, "filepath" if held else "linked_file", text="Address" if patina.address else "Linked File")
+            if patina.address:
+                column.operator("object.patina_open_address")
+            else:
+                column.prop(patina, "stream")
             column.operator("object.patina_linked_to_mesh")
         else:
             column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")

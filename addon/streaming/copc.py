@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""COPC 1.0: LAZ whose points are an octree's nodes, each to be read by itself. Knows neither Blender nor the library: reader.py runs it in a
+process of its own, without the rest of the add-on.
+
+A node's points are a sample of its cube; those of all nodes over a place together are the cloud there.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from source import Source, SourceError
+
+MOST_NODES = 1 << 23
+MOST_POINTS = 1 << 24  # of a node: more is no octree
+_INFO = 160  # bytes of its record
+_ENTRY = np.dtype([("key", "<i4", 4), ("offset", "<u8"), ("size", "<i4"), ("count", "<i4")])
+
+_BASE = [("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("intensity", "<u2"), ("bits", "u1"), ("flags", "u1"), ("class", "u1"),
+         ("user_data", "u1"), ("scan_angle", "<i2"), ("point_source_id", "<u2"), ("gps_time", "<f8")]
+_RGB = [("red", "<u2"), ("green", "<u2"), ("blue", "<u2")]
+_FORMATS = {6: _BASE, 7: _BASE + _RGB, 8: _BASE + _RGB + [("nir", "<u2")]}
+SCALARS = ("intensity", "user_data", "point_source_id", "scan_angle", "nir", "gps_time", "return_number", "number_of_returns")
+
+
+@dataclass
+class Tree:
+    """The file's head and its nodes, parents before their children."""
+
+    kind: np.dtype  # of a record
+    scale: np.ndarray  # (3,) float64
+    offset: np.ndarray
+    lower: np.ndarray  # box of all points
+    upper: np.ndarray
+    origin: np.ndarray  # (3,) float64; positions are relative to it
+    laszip: bytes
+    wkt: str
+    nodes: np.ndarray  # of _ENTRY
+    parents: np.ndarray  # (n,) int64; -1: none
+    cubes: np.ndarray  # (n, 6) float64, relative to the origin
+    gaps: np.ndarray  # (n,) float64
+    color: str = ""  # how colours become bytes: "low", "high", "wide" for 16 bits, "": there are none
+
+    @property
+    def points(self) -> int:
+        return int(self.nodes["count"].sum())
+
+
+def is_copc(head: bytes) -> bool:
+    """Of a file's first 429 bytes."""
+    return head[:4] == b"LASF" and head[377:381] == b"copc" and len(head) >= 429
+
+
+def read_tree(source: Source) -> Tree:
+    """SourceError with a sentence where it is none."""
+    head = source.read(0, 375 + 54 + _INFO)
+    if not is_copc(head) or head[24:26] != b"\x01\x04":
+        raise SourceError("no COPC file: its first record is not 'copc'")
+    header_size, data_offset, records, form, record_size = struct.unpack_from("<HIIBH", head, 94)
+    scale, offset = (np.array(struct.unpack_from("<3d", head, at)) for at in (131, 155))
+    high_x, low_x, high_y, low_y, high_z, low_z = struct.unpack_from("<6d", head, 179)
+    lower, upper = np.array([low_x, low_y, low_z]), np.array([high_x, high_y, high_z])
+    center_half_gap = struct.unpack_from("<5d", head, 429)
+    root, root_size = struct.unpack_from("<2Q", head, 469)
+    fields = _FORMATS.get(form & 0x3F)
+    numbers = np.concatenate([scale, offset, lower, upper, center_half_gap])
+    if fields is None or not np.isfinite(numbers).all() or center_half_gap[3] <= 0 or center_half_gap[4] <= 0 or (scale <= 0).any():
+        raise SourceError("its head is damaged: point format, scale, box or octree are none")
+    more = record_size - np.dtype(fields).itemsize
+    if more < 0 or header_size != 375 or data_offset > 1 << 28:
+        raise SourceError("its head is damaged: records are too short, or the points lie nowhere")
+    laszip, wkt = _records(source, data_offset, records)
+    nodes = _hierarchy(source, root, root_size)
+    parents, cubes, gaps = _arrange(nodes, np.array(center_half_gap[:3]), center_half_gap[3], center_half_gap[4])
+    origin = np.floor(lower) if np.abs([lower, upper]).max() * 2.0 ** -24 > 0.5 * scale.min() else np.zeros(3)
+    grown = np.tile(np.array([-1, 1])[:, None] * scale, 1).reshape(1, 6)  # points are rounded to the scale
+    return Tree(np.dtype(fields + [("more", f"V{more}")] * bool(more)), scale, offset, lower, upper, origin, laszip, wkt, nodes, parents,
+                cubes - np.tile(origin, 2) + grown, gaps)
+
+
+def _records(source: Source, end: int, count: int) -> tuple[bytes, str]:
+    """What LAZ needs to know, and the coordinate system's text."""
+    head = source.read(375, end - 375)
+    at, laszip, wkt = 0, b"", ""
+    for _ in range(min(count, 4096)):
+        if at + 54 > len(head):
+            break
+        number, length = struct.unpack_from("<HH", head, at + 18)
+        user, data = head[at + 2:at + 18].rstrip(b"\0"), head[at + 54:at + 54 + length]
+        if user == b"laszip encoded" and number == 22204:
+            laszip = data
+        elif user == b"LASF_Projection" and number == 2112:
+            wkt = data.rstrip(b"\0").decode("utf-8", "replace")
+        at += 54 + length
+    if not laszip:
+        raise SourceError("its head is damaged: it does not say how its points are packed")
+    return laszip, wkt
+
+
+def _hierarchy(source: Source, root: int, root_size: int) -> np.ndarray:
+    """Entries of all nodes with points, by their key."""
+    pages, found, seen, total = [(root, root_size)], [], set(), 0
+    while pages:
+        offset, size = pages.pop()
+        if offset in seen or offset > 1 << 60 or size <= 0 or size % _ENTRY.itemsize or size > _ENTRY.itemsize * MOST_NODES:
+            raise SourceError("its octree is damaged: a page of the hierarchy lies nowhere, or twice")
+        seen.add(offset)
+        entries = np.frombuffer(source.read(offset, size), _ENTRY)
+        pages += [(int(entry["offset"]), int(entry["size"])) for entry in entries[entries["count"] == -1]]
+        found.append(entries[entries["count"] > 0])
+        total += len(found[-1])
+        if total > MOST_NODES:
+            raise SourceError("its octree is damaged: it has too many nodes")
+    nodes = np.concatenate(found)
+    if not len(nodes) or (nodes["size"] <= 0).any() or (nodes["count"] > MOST_POINTS).any():
+        raise SourceError("its octree is damaged: a node has no points, or too many")
+    order = np.lexsort([nodes["key"][:, k] for k in (3, 2, 1, 0)])  # by depth first
+    return nodes[order]
+
+
+def _arrange(nodes: np.ndarray, center: np.ndarray, half: float, gap: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    keys = nodes["key"].astype(np.int64)
+    depth = keys[:, 0]
+    if depth.min() < 0 or depth.max() > 30 or (keys[:, 1:] < 0).any() or (keys[:, 1:] >= (1 << depth)[:, None]).any():
+        raise SourceError("its octree is damaged: a node lies outside of it")
+    places = {tuple(key): index for index, key in enumerate(keys.tolist())}
+    if len(places) != len(keys):
+        raise SourceError("its octree is damaged: a node is there twice")
+    parents = np.empty(len(keys), np.int64)
+    for index, (level, *at) in enumerate(keys.tolist()):
+        parents[index] = -1
+        while level > 0 and parents[index] < 0:  # nodes without points are none
+            level, at = level - 1, [value >> 1 for value in at]
+            parents[index] = places.get((level, *at), -1)
+    side = 2.0 * half / (1 << depth)
+    lower = center - half + keys[:, 1:] * side[:, None]
+    return parents, np.hstack([lower, lower + side[:, None]]), gap / (1 << depth)
+
+
+def unpack(tree: Tree, index: int, data: bytes) -> np.ndarray:
+    """A node's records. SourceError where they are not what the file promises."""
+    import lazrs
+    count = int(tree.nodes["count"][index])
+    records = np.zeros(count, tree.kind)
+    try:
+        lazrs.decompress_points_with_chunk_table(data, tree.laszip, records.view(np.uint8), [(count, len(data))],
+                                                 lazrs.DecompressionSelection(lazrs.SELECTIVE_DECOMPRESS_ALL))
+    except Exception as error:
+        raise SourceError(f"cannot be unpacked: {error}") from None
+    except BaseException as error:  # what lazrs has not thought of is none of Exception's kinds
+        if type(error).__name__ != "PanicException":
+            raise
+        raise SourceError(f"cannot be unpacked: {error}") from None
+    return records
+
+
+def color_of(tree: Tree, records: np.ndarray) -> str:
+    """How many bits colours have, by some of them."""
+    if "red" not in tree.kind.names:
+        return ""
+    rgb = np.stack([records[name] for name in ("red", "green", "blue")])
+    if rgb.max() <= 255:
+        return "low"
+    return "high" if not (rgb & 255).any() or (rgb == (rgb >> 8) * 257).all() else "wide"
+
+
+def columns(tree: Tree, index: int, records: np.ndarray, scalar: str) -> dict[str, np.ndarray]:
+    """positions (n, 3) float32, relative to the origin; colors (n, 3) uint8 or uint16; scalars (n, 1) float32; classes (n, 1) uint8."""
+    positions = np.empty((len(records), 3), np.float32)
+    box = tree.cubes[index]
+    for axis, name in enumerate("XYZ"):
+        exact = records[name] * tree.scale[axis] + (tree.offset[axis] - tree.origin[axis])
+        if exact.min() < box[axis] or exact.max() > box[3 + axis]:
+            raise SourceError("points outside of its cube")
+        positions[:, axis] = exact
+    found = {"positions": positions, "classes": np.ascontiguousarray(records["class"][:, None])}
+    if tree.color:
+        rgb = np.stack([records[name] for name in ("red", "green", "blue")], 1)
+        found["colors"] = {"low": lambda: np.minimum(rgb, 255).astype(np.uint8), "high": lambda: (rgb >> 8).astype(np.uint8),
+                           "wide": lambda: rgb}[tree.color]()
+    if scalar:
+        found["scalars"] = scalar_of(records, scalar)
+    return found
+
+
+def scalar_of(records: np.ndarray, name: str) -> np.ndarray:
+    if name == "return_number":
+        values = records["bits"] & 15
+    elif name == "number_of_returns":
+        values = records["bits"] >> 4
+    else:
+        values = records[name]
+    return values.astype(np.float32)[:, None]
+
+
+def has_scalar(tree: Tree, name: str) -> bool:
+    return name in SCALARS and (name in tree.kind.names or name in {"return_number", "number_of_returns"})

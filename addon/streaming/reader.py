@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The process that reads and unpacks a COPC's pages beside Blender: python reader.py FOLDER. Blender must not run Python on threads of its
+own while it goes on (jobs.py), nor wait for a disk or a server.
+
+Each line of its input is JSON: first {"place", "scalar", "workers", "timeout", "wait"}, then {"pages": [...]}, which takes the place of all
+that was asked for and is not yet begun. What it finds goes into the folder, each file whole or not at all: tree.json and tree.bin, N.page with
+a page's columns one behind the other, N.bad with a sentence, down with one where nothing can be fetched any more, error with one that ends it. It
+ends with its input.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import copc  # noqa: E402
+from source import SourceError, source_of  # noqa: E402
+
+MOST_FAILURES = 3  # pages in a row that cannot be fetched: then nothing else is tried until somebody asks again
+MOST_WAITING = 24  # pages that lie there until Blender takes them
+
+
+class Reader:
+    def __init__(self, folder: Path, wanted: dict) -> None:
+        self._folder, self._scalar = folder, wanted.get("scalar", "")
+        self._source = source_of(wanted["place"], wanted.get("timeout", 20.0), wanted.get("wait", 0.5))
+        self._tree = copc.read_tree(self._source)
+        first = self._records(0)
+        self._tree.color = copc.color_of(self._tree, first)
+        self._scalar = self._scalar if copc.has_scalar(self._tree, self._scalar) else ""
+        self._queue: list[int] = []
+        self._done: set[int] = set()
+        self._failures = 0
+        self._change = threading.Condition()
+        self._tell_tree()
+        for _ in range(wanted.get("workers", 2)):
+            threading.Thread(target=self._work, daemon=True).start()
+
+    def _records(self, index: int):
+        node = self._tree.nodes[index]
+        return copc.unpack(self._tree, index, self._source.read(int(node["offset"]), int(node["size"])))
+
+    def _tell_tree(self) -> None:
+        tree = self._tree
+        self._put("tree.bin", tree.cubes.astype("<f8").tobytes() + tree.gaps.astype("<f8").tobytes()
+                  + tree.nodes["count"].astype("<u4").tobytes() + tree.parents.astype("<i4").tobytes()
+                  + tree.nodes["size"].astype("<u4").tobytes())
+        self._put("tree.json", json.dumps({
+            "nodes": len(tree.nodes), "color": tree.color, "scalar": self._scalar, "origin": tree.origin.tolist(), "wkt": tree.wkt,
+            "lower": (tree.lower - tree.origin).tolist(), "upper": (tree.upper - tree.origin).tolist()}).encode())
+
+    def ask(self, pages: list[int]) -> None:
+        with self._change:
+            self._failures = 0
+            self._queue = [page for page in pages if 0 <= page < len(self._tree.nodes) and page not in self._done]
+            self._change.notify_all()
+
+    def forget(self, pages: list[int]) -> None:
+        """That were given back, and may be asked for again."""
+        with self._change:
+            self._done -= set(pages)
+
+    def _next(self) -> int:
+        with self._change:
+            while True:
+                if self._queue and sum(name.endswith(".page") for name in os.listdir(self._folder)) < MOST_WAITING:
+                    page = self._queue.pop(0)
+                    self._done.add(page)
+                    return page
+                self._change.wait(0.01 if self._queue else None)
+
+    def _work(self) -> None:
+        while True:
+            page = self._next()
+            try:
+                self._unpack(page)
+            except OSError:  # the folder is gone: so is Blender
+                os._exit(1)
+
+    def _unpack(self, page: int) -> None:
+        node = self._tree.nodes[page]
+        try:
+            data = self._source.read(int(node["offset"]), int(node["size"]))
+        except SourceError as error:
+            with self._change:
+                self._done.discard(page)
+                self._failures += 1
+                down = self._failures >= MOST_FAILURES
+                self._queue = [] if down else self._queue
+            self._put("down" if down else f"{page}.bad", f"page {page}: {error}".encode("utf-8", "replace"))
+            return
+        with self._change:
+            self._failures = 0
+        try:
+            records = copc.unpack(self._tree, page, data)
+            found = copc.columns(self._tree, page, records, self._scalar)
+        except SourceError as error:
+            with self._change:
+                self._done.discard(page)
+            self._put(f"{page}.bad", f"page {page}: {error}".encode("utf-8", "replace"))
+            return
+        self._put(f"{page}.page", b"".join(found[name].tobytes() for name in ("positions", "colors", "scalars", "classes")
+                                           if name in found))
+
+    def _put(self, name: str, data: bytes) -> None:
+        part = self._folder / f"{name}.part"
+        part.write_bytes(data)
+        os.replace(part, self._folder / name)
+
+
+def main() -> None:
+    folder = Path(sys.argv[1])
+    try:
+        reader = Reader(folder, json.loads(sys.stdin.readline()))
+    except Exception as error:
+        text = str(error) if isinstance(error, SourceError) else f"{type(error).__name__}: {error}"
+        part = folder / "error.part"
+        part.write_text(text, "utf-8")
+        os.replace(part, folder / "error")
+        return
+    for line in sys.stdin:
+        wish = json.loads(line)
+        if "forget" in wish:
+            reader.forget(wish["forget"])
+        if "pages" in wish:
+            reader.ask(wish["pages"])
+    os._exit(0)  # workers may wait for a server
+
+
+if __name__ == "__main__":
+    main()

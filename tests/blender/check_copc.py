@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""COPC without conversion: the picture of a flat import, of no more points than it shows; from a disk, and from servers good and bad."""
+
+import http.server
+import re
+import threading
+import time
+from contextlib import contextmanager, suppress
+from functools import partial
+
+import bpy
+import numpy as np
+from check_formats import with_laspy
+from copc_files import points_of, write_copc
+from harness import SCRATCH, check, new_scene, render, reports, stats
+from mathutils import Matrix
+from patina import native, streaming
+from patina.sync import addresses, clouds, linked
+
+bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
+
+POINTS = 30000
+
+
+def made(name, count=POINTS, offset=(0.0, 0.0, 0.0), **how):
+    with_laspy()
+    path = SCRATCH / name
+    records, positions = points_of(count, offset, **{key: how.pop(key) for key in ("seed", "wide") if key in how})
+    return path, write_copc(path, records, offset, **how), positions
+
+
+def see(objects, z=-4.0):
+    for obj in objects:
+        obj.matrix_world = Matrix.Translation((0, 0, z)) @ obj.matrix_world
+
+
+def import_copc(path, stream):
+    before = set(bpy.data.objects)
+    result = bpy.ops.import_scene.patina_points(filepath=str(path), link=True, stream=stream)
+    check(result == {'FINISHED'}, f"{result}")
+    return [obj for obj in bpy.data.objects if obj not in before]
+
+
+def stream_of():
+    """Of the one cloud that is there."""
+    found = streaming.streams_of(cloud for _, cloud in clouds.CACHE._entries.values())
+    check(len(found) == 1, f"{len(found)} streams")
+    return found[0]
+
+
+def same(flat, streamed, what):
+    """The same depths. Colors are means of points within a layer distance, which follows each chunk's spacing: other chunks, others."""
+    deep = np.isfinite(flat["Depth"]) & np.isfinite(streamed["Depth"])
+    other = np.isfinite(flat["Depth"]) != np.isfinite(streamed["Depth"])
+    off = np.abs(np.where(deep, flat["Depth"], 0) - np.where(deep, streamed["Depth"], 0)) > 1e-5
+    far = np.abs(flat["Combined"] - streamed["Combined"]).max(axis=-1)
+    print(f"  {what}: {(off | other).sum()} depths differ; colors: {(far > 2e-3).mean():.2%} by more than 0.002, the most {far.max():.4f}")
+    check(deep.mean() > 0.3 and (off | other).mean() < 0.001, f"{what}: depths differ")
+    check((far > 2e-3).mean() < 0.04 and far.max() < 0.05, f"{what}: colors differ")
+
+
+def test_same_picture_as_flat():
+    for name, offset, how in (("plain.copc.laz", (0, 0, 0), {}), ("far.copc.laz", (485000.0, 5428000.0, 300.0), {"pages": True}),
+                              ("wide.copc.laz", (0, 0, 0), {"wide": True})):
+        path, entries, _ = made(name, offset=offset, **how)
+        pictures = []
+        for stream in ('OFF', 'ON'):
+            clouds.CACHE.clear()
+            new_scene()
+            objects = import_copc(path, stream)
+            objects[0].patina.analysis = 'OFF'
+            see(objects)
+            pictures.append(render())
+        check(f"{POINTS:,} points" in stats[-1] and not reports, f"{stats[-1]} {reports}")
+        same(*pictures, name)
+        stream = stream_of()
+        check(0 < stream.arrived <= len(entries), f"{stream.arrived} pages of {len(entries)}")
+        print(f"  {name}: {stream.arrived} of {len(entries)} pages")
+
+
+def test_only_what_is_seen():
+    path, entries, positions = made("seen.copc.laz", 60000)
+    clouds.CACHE.clear()
+    scene = new_scene()
+    see(import_copc(path, 'ON'), -1.15)
+    scene.camera.data.lens = 300
+    picture = render()
+    check(np.isfinite(picture["Depth"]).mean() > 0.1, "nothing is seen")
+    stream = stream_of()
+    print(f"  {stream.arrived} of {len(entries)} pages, {stream.cloud.pages()['arrived']:,} of {len(positions):,} points")
+    check(stream.arrived < 0.7 * len(entries), f"{stream.arrived} of {len(entries)} pages")
+    check(any("Fetching" in text and "MB" in text for text in stats), f"{stats[:8]}")
+
+
+def test_scalars_and_classes():
+    path, _, _ = made("values.copc.laz")
+    clouds.CACHE.clear()
+    new_scene()
+    obj, = import_copc(path, 'ON')
+    obj.patina.colors.source = 'SCALAR'
+    obj.patina.colors.scalar = "intensity"
+    see([obj])
+    render()
+    cloud = stream_of().cloud
+    cloud._learn()
+    check(cloud.has_scalars and cloud.has_classes and cloud.class_bits[0] == 0b1100, f"{cloud.class_bits}")
+    low, high = cloud.scalar_range(0.0)
+    check(0 <= low < 500 and 59000 < high <= 60000, f"{low} to {high}")
+
+
+def test_a_small_one_is_read_whole():
+    path, _, _ = made("small.copc.laz")
+    clouds.CACHE.clear()
+    new_scene()
+    obj, = import_copc(path, 'AUTO')
+    see([obj])
+    render()
+    check(not streaming.streams_of(cloud for _, cloud in clouds.CACHE._entries.values()), "it is streamed")
+    obj.patina.stream = 'ON'
+    render()
+    check(stream_of().cloud.count == POINTS, "it is not streamed")
+
+
+def test_damaged_files():
+    path, entries, _ = made("damaged.copc.laz")
+    good = path.read_bytes()
+    for name, at, what, told in (("page", entries[3][1] + 20, bytes(np.random.default_rng(1).integers(0, 256, 200, np.uint8)), "page"),
+                                 ("tree", 469, b"\xff" * 8, "cannot be read"), ("short", None, None, "cannot be read"),
+                                 ("laszip", 589 + 2, b"nobody", "does not say how its points are packed")):
+        bad = SCRATCH / f"bad-{name}.copc.laz"
+        bad.write_bytes(good[:800] if at is None else good[:at] + what + good[at + len(what):])
+        clouds.CACHE.clear()
+        new_scene()
+        reports.clear()
+        try:
+            objects = import_copc(bad, 'ON')
+        except RuntimeError as error:
+            check(name != "page" and (told in str(error) or "bad-" in str(error)), str(error))
+            continue
+        see(objects)
+        render()
+        said = " ".join(text for _, text in reports)
+        check(name == "page" and str(bad) in said and "page " in said, f"{name}: {said}")
+        print(f"  {said}")
+
+
+# ---- servers -------------------------------------------------------------------------------------------------------------
+
+
+class Server(http.server.BaseHTTPRequestHandler):
+    """Parts of files, as they are asked for. how: what it does wrong; asked: ranges so far."""
+
+    protocol_version = "HTTP/1.1"
+
+    def __init__(self, path, how, asked, *arguments):
+        self._file, self._how, self._asked = path, how, asked
+        super().__init__(*arguments)
+
+    def log_message(self, *_):
+        pass
+
+    def do_GET(self):
+        data, how = self._file.read_bytes(), self._how
+        first, last = map(int, re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups())
+        self._asked.append((first, last))
+        new = self._asked.count((first, last)) == 1
+        part, head = data[first:last + 1], len(self._asked) <= 4  # the octree comes as it should
+        if how == "slow" or how == "hangs" and not head:
+            time.sleep(0.02 if how == "slow" else 30)
+        if how == "refuses":
+            self.send_error(404)
+            return
+        if how == "busy" and new:
+            self.send_error(503)
+            return
+        whole = how == "whole"
+        self.send_response(200 if whole else 206)
+        if how == "garbage" and not head:
+            part = bytes(len(part))
+        shift = 7 if how == "other" and not head else 0
+        self.send_header("Content-Range", f"bytes {first + shift}-{last + shift}/{len(data)}")
+        self.send_header("Content-Length", str(len(data) if whole else len(part)))
+        self.end_headers()
+        if how == "cut" and not head:
+            self.wfile.write(part[:len(part) // 2])
+            self.close_connection = True
+            return
+        if how == "flaky" and new:
+            self.close_connection = True
+            return
+        with suppress(ConnectionError):  # nobody waits for the rest
+            self.wfile.write(data if whole else part)
+
+
+@contextmanager
+def server(path, how=""):
+    asked = []
+    running = http.server.ThreadingHTTPServer(("127.0.0.1", 0), partial(Server, path, how, asked))
+    running.daemon_threads = True
+    threading.Thread(target=running.serve_forever, args=(0.02,), daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{running.server_address[1]}/{path.name}", asked
+    finally:
+        running.shutdown()
+        running.server_close()
+
+
+@contextmanager
+def in_a_hurry():
+    kept = streaming.TIMEOUT, streaming.WAIT
+    online, addresses.online = addresses.online, lambda: True
+    streaming.TIMEOUT, streaming.WAIT = 0.4, 0.02
+    try:
+        yield
+    finally:
+        (streaming.TIMEOUT, streaming.WAIT), addresses.online = kept, online
+
+
+def open_address(address):
+    before = set(bpy.data.objects)
+    check(bpy.ops.import_scene.patina_address(address=address) == {'FINISHED'}, "not opened")
+    obj, = [obj for obj in bpy.data.objects if obj not in before]
+    return obj
+
+
+def test_address():
+    path, entries, _ = made("served.copc.laz")
+    clouds.CACHE.clear()
+    new_scene()
+    see(import_copc(path, 'ON'))
+    local = render()
+    for how in ("", "slow", "busy", "flaky"):
+        clouds.CACHE.clear()
+        new_scene()
+        with server(path, how) as (address, asked), in_a_hurry():
+            obj = open_address(address)
+            check(obj.patina.linked_file == address and obj.name == "served", f"{obj.name} {obj.patina.linked_file}")
+            see([obj])
+            found = render()
+        check(not reports, f"{how}: {reports}")
+        for name, pixels in local.items():
+            check((pixels == found[name]).all(), f"{how}: {name} differs")
+        size = sum(last + 1 - first for first, last in asked)
+        print(f"  {how or 'good'}: {len(asked)} ranges, {size:,} bytes of {path.stat().st_size:,}")
+
+
+def test_servers_that_fail():
+    path, _, _ = made("fails.copc.laz", 8000)
+    for how, told in (("hangs", "does not answer in time"), ("cut", "cut the connection"), ("garbage", "page "), ("other", "another part"),
+                      ("refuses", "answers 404"), ("whole", "sends no parts of files")):
+        clouds.CACHE.clear()
+        new_scene()
+        reports.clear()
+        with server(path, how) as (address, _), in_a_hurry():
+            try:
+                see([open_address(address)])
+            except RuntimeError as error:
+                check(how in {"refuses", "whole"}, str(error))
+                said = str(error)
+            else:
+                render()
+                said = " ".join(text for _, text in reports)
+        check(told in said and address in said, f"{how}: {said}")
+        print(f"  {how}: {said.strip()}")
+
+
+def test_nothing_is_fetched_unasked():
+    path, _, _ = made("unasked.copc.laz", 3000)
+    clouds.CACHE.clear()
+    new_scene()
+    online, addresses.online = addresses.online, lambda: False
+    try:
+        with server(path) as (address, asked):
+            try:
+                bpy.ops.import_scene.patina_address(address=address)
+            except RuntimeError as error:
+                check("online" in str(error).lower(), str(error))
+            else:
+                check(False, "it was fetched")
+            check(not asked, f"{asked}")
+            obj = bpy.data.objects.new("there", linked.box_mesh("there", ((0, 0, 0), (1, 1, 1))))
+            bpy.context.scene.collection.objects.link(obj)
+            obj.patina.linked_file = address
+            render()
+            check(not asked and any("online" in text.lower() for _, text in reports), f"{asked} {reports}")
+            for bad in ("ftp://127.0.0.1/x.copc.laz", "file:///etc/passwd"):
+                try:
+                    addresses.check(bad)
+                except native.PatinaError as error:
+                    check("only http" in str(error), str(error))
+                else:
+                    check(False, f"{bad} is an address")
+    finally:
+        addresses.online = online
+
+
+def test_ends_with_its_cloud():
+    path, _, _ = made("ends.copc.laz", 3000)
+    clouds.CACHE.clear()
+    new_scene()
+    see(import_copc(path, 'ON'))
+    render()
+    stream = stream_of()
+    process, place = stream._process, stream._place
+    check(process.poll() is None and place.is_dir(), "not there")
+    del stream
+    clouds.CACHE.clear()
+    new_scene()
+    import gc
+    gc.collect()
+    check(process.poll() is not None and not place.is_dir(), "the process or its folder stays")
