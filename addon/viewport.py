@@ -21,7 +21,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from . import backdrop, dots, mattes, native, pace, render, sky, sync
+from . import backdrop, dots, mattes, native, pace, render, sky, streaming, sync
 from .jobs import Pause, Steps
 from .native.points import highlight
 from .sync import analysis, edits
@@ -35,6 +35,7 @@ HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that overlays' depth is nearer than t
 ROUNDING = 4.0 * 2.0 ** -24  # and by so many steps of Blender's depths of 24 bits: each may be meters, far away in a view that begins near
 REST = 0.12  # seconds without motion after which the whole picture is drawn
 RESIZED = 0.25  # seconds that a redraw waits for the first picture, or that of a new size
+ARRIVALS = 0.2  # seconds between two pictures of points that arrive
 BETTER = 200.0  # milliseconds of further samples between two pictures of a view at rest
 
 SELECTED = (1.0, 0.35, 0.02)  # linear, and its share of the pixel: of selected points
@@ -128,6 +129,8 @@ class Viewport:
         self._progress: native.Progress | None = None  # while clouds are made
         self._rendering: native.Frame | None = None  # that is drawn
         self._spare: list[np.ndarray] = []  # planes of the picture before the one that is shown
+        self._fresh = False  # points have come that no picture shows yet
+        self._fetched = 0.0  # when the last picture for such was asked for
         self._closed = False
         self._news = False
         self._frame: tuple[native.Device, native.Frame] | None = None
@@ -249,7 +252,15 @@ class Viewport:
             return analysis.label(under_way[0])
         stats = self.shown.stats
         samples = f", {stats['pixel_samples']} samples" if stats["pixel_samples"] > 1 else ""
-        return f"{stats['points']:,} points, {stats['ms']:.0f} ms, {self.shown.device}{samples}"
+        return f"{stats['points']:,} points, {stats['ms']:.0f} ms, {self.shown.device}{samples}{self._on_their_way()}"
+
+    def _on_their_way(self) -> str:
+        """What is still to come of points that are read as they are wanted, and what failed."""
+        streams = self._streams()
+        coming = [stream.outlook() for stream in streams]
+        points, size = sum(one.points for one in coming), sum(one.megabytes for one in coming)
+        said = next((f". {stream.message}" for stream in streams if stream.message), "")
+        return (f", {points:,} points on their way ({size:,.1f} MB)" if points else "") + said
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
         overlays = context.space_data.overlay.show_overlays
@@ -317,6 +328,7 @@ class Viewport:
             self._spare = [last.color, last.depth] if last and last.depth is not shown.depth else []
             self.pictures += 1
             self._wish_analyses()
+            self._wish_points()
             if (shown.stats["shadow_pending"] or self._bettered) and not self._wanted:
                 self._wanted = wish  # more samples of soft shadows, or of pixels
         return True
@@ -324,6 +336,29 @@ class Viewport:
     def _wish_analyses(self) -> None:
         pending = [item.cloud for item in self.shown.wish.scene.clouds if item.analyzed and item.cloud.analyzed]
         ANALYSES.wish(self, [(cloud.built, cloud.stations) for cloud in pending])
+
+    def _streams(self) -> list[streaming.Stream]:
+        return streaming.streams_of(item.cloud for item in self.shown.clouds) if self.shown else []
+
+    def _wish_points(self) -> None:
+        if not CACHE.final():  # a final picture's come first
+            for stream in self._streams():
+                stream.wish(streaming.AT_REST)
+
+    def fetch(self) -> bool:
+        """Takes what has come of points that are read as they are wanted, and draws them now and then. Whether more is to come."""
+        streams, news = self._streams(), False
+        for stream in streams:
+            news |= stream.advance()
+            if stream.message and stream.message not in self.notices:
+                self.notices = [*self.notices, stream.message]
+                self._news = True
+        self._fresh |= news
+        busy, now = any(stream.busy for stream in streams), time.monotonic()
+        if self._fresh and not self._working and not self._wanted and (now - self._fetched > ARRIVALS or not busy):
+            self._fresh, self._fetched = False, now
+            self._ask(self._last.level)
+        return busy or self._fresh
 
     def analyzed(self, clouds: list[native.Cloud]) -> None:
         """Of these clouds all is known now: what it shows of them is drawn again."""
@@ -520,6 +555,7 @@ def _tick() -> float | None:
             viewport.analyzed(changed)
         if damaged:
             viewport.rebuild(damaged)
+        again |= viewport.fetch()
         again |= viewport.tick()
     return TICK if again else None
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from .. import jobs, memory, native
 
-MOST_TASKS = 4  # pages that are handed in at once
+MOST_TASKS = 24  # pages that are handed in at once: where drawing is slow, Blender looks but a few times a second
 ROOM = 4096  # pages that are asked for at once
 AT_REST = 1.0  # pixels: the viewport wants pages whose parents' points lie wider apart
 POLL = 0.001  # seconds between two looks for the head of a file

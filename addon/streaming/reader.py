@@ -21,7 +21,7 @@ import copc  # noqa: E402
 from source import SourceError, source_of  # noqa: E402
 
 MOST_FAILURES = 3  # pages in a row that cannot be fetched: then nothing else is tried until somebody asks again
-MOST_WAITING = 24  # pages that lie there until Blender takes them
+MOST_WAITING = 64  # pages that lie there until Blender takes them
 
 
 class Reader:

@@ -2,10 +2,8 @@
 """COPC without conversion: the picture of a flat import, of no more points than it shows; from a disk, and from servers good and bad."""
 
 import http.server
-import re
 import threading
-import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 
 import bpy
@@ -16,6 +14,7 @@ from harness import SCRATCH, check, new_scene, render, reports, stats
 from mathutils import Matrix
 from patina import native, streaming
 from patina.sync import addresses, clouds, linked
+from range_server import Server
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
 
@@ -145,51 +144,6 @@ def test_damaged_files():
 
 
 # ---- servers -------------------------------------------------------------------------------------------------------------
-
-
-class Server(http.server.BaseHTTPRequestHandler):
-    """Parts of files, as they are asked for. how: what it does wrong; asked: ranges so far."""
-
-    protocol_version = "HTTP/1.1"
-
-    def __init__(self, path, how, asked, *arguments):
-        self._file, self._how, self._asked = path, how, asked
-        super().__init__(*arguments)
-
-    def log_message(self, *_):
-        pass
-
-    def do_GET(self):
-        data, how = self._file.read_bytes(), self._how
-        first, last = map(int, re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups())
-        self._asked.append((first, last))
-        new = self._asked.count((first, last)) == 1
-        part, head = data[first:last + 1], len(self._asked) <= 4  # the octree comes as it should
-        if how == "slow" or how == "hangs" and not head:
-            time.sleep(0.02 if how == "slow" else 30)
-        if how == "refuses":
-            self.send_error(404)
-            return
-        if how == "busy" and new:
-            self.send_error(503)
-            return
-        whole = how == "whole"
-        self.send_response(200 if whole else 206)
-        if how == "garbage" and not head:
-            part = bytes(len(part))
-        shift = 7 if how == "other" and not head else 0
-        self.send_header("Content-Range", f"bytes {first + shift}-{last + shift}/{len(data)}")
-        self.send_header("Content-Length", str(len(data) if whole else len(part)))
-        self.end_headers()
-        if how == "cut" and not head:
-            self.wfile.write(part[:len(part) // 2])
-            self.close_connection = True
-            return
-        if how == "flaky" and new:
-            self.close_connection = True
-            return
-        with suppress(ConnectionError):  # nobody waits for the rest
-            self.wfile.write(data if whole else part)
 
 
 @contextmanager

@@ -27,6 +27,7 @@ def tests():
     import check_drawn
     import check_newcomer
     import check_overlays
+    import check_view_copc
     import check_view_edits
     import check_viewport
     import check_viewport_life
@@ -38,7 +39,7 @@ def tests():
     if names == ["figures"]:
         import figures
         yield "figures", figures.orbit_figures
-    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_view_edits, check_newcomer)
+    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_view_copc, check_view_edits, check_newcomer)
     for name, test in [item for module in modules for item in vars(module).items()]:
         short = name.removeprefix("test_")
         if name.startswith("test_") and (any(part in name for part in names) if names else short not in ALONE):
