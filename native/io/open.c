@@ -102,6 +102,10 @@ static int open_file(const char *path, bool alone, struct patina_progress *progr
     struct pt_input input = {.progress = progress};
     struct pt_disk disk;
     pt_clip_name(input.name, sizeof input.name, path);
+    if (pt_same_start(path, "http://", 7) || pt_same_start(path, "https://", 8))
+        return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED,
+                       "%s: an address, whose COPC Patina's add-on for Blender shows, by Python; here files are read",
+                       input.name);
     pt_progress_set(progress, 0);
     int error = pt_disk_open(path, &disk);
     if (error)

@@ -34,6 +34,8 @@ def test_formats_of_the_add_on():
         for arguments in (("info", name), ("render", name, "-o", "x.png"), ("convert", name, "x.ply")):
             error = cli.run(*arguments, code=1).stderr
             assert f"{name}: a file of format {word}, which Patina's add-on for Blender reads" in error, error
+    error = cli.run("info", "https://host/site.copc.laz", code=1).stderr
+    assert "https://host/site.copc.laz: an address, whose COPC Patina's add-on for Blender shows" in error, error
 
 
 def test_bytes_too_many_are_told():
