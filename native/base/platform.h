@@ -114,6 +114,12 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
 enum pt_disk_use { PT_DISK_ONCE, PT_DISK_ANYWHERE }; // read once from end to end, or here and there
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data);
 
+// A file without a name, for what memory has no room for: it goes with its handle, and with a process that is killed. path: a file that it
+// lies on the same disk with. Read by pt_disk_read, by one thread at a time as long as somebody writes.
+int pt_disk_spill(const char *path, struct pt_disk *disk);
+int pt_disk_write(struct pt_disk *disk, uint64_t offset, const void *data, size_t size);
+int pt_disk_room(const char *path, uint64_t *bytes); // that this user may yet write where the file lies, or would
+
 FILE *pt_stream_open(const char *path, const char *mode); // as fopen; programs that are started do not inherit it
 int pt_stream_seek(FILE *stream, uint64_t offset);
 int pt_stream_resize(FILE *stream, uint64_t size); // cuts it, or adds zeros; what was written is with the system then
@@ -121,10 +127,12 @@ int pt_stream_resize(FILE *stream, uint64_t size); // cuts it, or adds zeros; wh
 int pt_file_remove(const char *path);
 
 // A file that is there whole or not at all: written beside `path`, then put in its place. A file that is mapped must not change.
+// Several may write one file at a time, each beside: the last to end has it. What killed processes left beside it goes at the next begin.
 // Windows: EBUSY, and the old file stays, while any program has it open or maps it.
 struct pt_whole {
     FILE *stream; // what is written goes here
     char *path, *beside;
+    intptr_t lock; // of the system's own
 };
 int pt_whole_begin(const char *path, struct pt_whole *whole); // an error: there is nothing to end
 // good: all was written, so the file takes its place. By the thread that wrote. Returns the error that kept it from doing so.

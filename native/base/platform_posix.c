@@ -14,8 +14,10 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -251,6 +253,61 @@ int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum p
     return 0;
 }
 
+int pt_disk_spill(const char *path, struct pt_disk *disk)
+{
+    static const char ending[] = ".spill";
+    const size_t length = strlen(path);
+    char *name = malloc(length + sizeof ending);
+    if (!name)
+        return ENOMEM;
+    memcpy(name, path, length);
+    memcpy(name + length, ending, sizeof ending);
+    int descriptor, error = 0;
+    for (int i = 0; i < 100; i++) { // another process may be between its opening and its removing of the name
+        descriptor = open(name, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+        error = descriptor < 0 ? errno : 0;
+        if (error == EEXIST)
+            unlink(name);
+        else
+            break;
+    }
+    if (!error)
+        unlink(name);
+    free(name);
+    *disk = (struct pt_disk){.handle = descriptor, .kind = PT_DISK_FILE};
+    return error;
+}
+
+int pt_disk_write(struct pt_disk *disk, uint64_t offset, const void *data, size_t size)
+{
+    for (size_t done = 0; done < size;) {
+        const ssize_t now = pwrite((int)disk->handle, (const char *)data + done, size - done, (off_t)(offset + done));
+        if (now < 0 && errno == EINTR)
+            continue;
+        if (now <= 0)
+            return now < 0 ? errno : ENOSPC;
+        done += (size_t)now;
+    }
+    disk->size = disk->size > offset + size ? disk->size : offset + size;
+    return 0;
+}
+
+int pt_disk_room(const char *path, uint64_t *bytes)
+{
+    const char *slash = strrchr(path, '/');
+    const size_t length = slash ? (size_t)(slash - path) + 1 : 0;
+    char *folder = malloc(length + 2);
+    struct statvfs status;
+    if (!folder)
+        return ENOMEM;
+    memcpy(folder, length ? path : ".", length ? length : 1);
+    folder[length ? length : 1] = 0;
+    const int error = statvfs(folder, &status) ? errno : 0;
+    free(folder);
+    *bytes = error ? 0 : (uint64_t)status.f_bavail * status.f_frsize;
+    return error;
+}
+
 FILE *pt_stream_open(const char *path, const char *mode)
 {
 #ifdef __APPLE__ // which knows no "e" before 13
@@ -274,28 +331,83 @@ int pt_stream_resize(FILE *stream, uint64_t size)
 
 int pt_file_remove(const char *path) { return unlink(path) ? errno : 0; }
 
+// ---- files that are there whole or not at all -----------------------------------------------------------------------------
+
+// Names beside the file, so that several may write it at a time.
+enum { SLOTS = 9 };
+
+static void name_slot(const struct pt_whole *whole, int slot)
+{
+    const size_t length = strlen(whole->path);
+    memcpy(whole->beside, whole->path, length);
+    memcpy(whole->beside + length, slot ? ".part0" : ".part", slot ? 7 : 6);
+    if (slot)
+        whole->beside[length + 5] = (char)('1' + slot);
+}
+
+// Opens and locks what lies beside; EWOULDBLOCK where another process, or thread, writes it.
+static int take_slot(const struct pt_whole *whole, int flags, int *descriptor)
+{
+    struct stat held, named;
+    for (;;) {
+        *descriptor = open(whole->beside, O_RDWR | O_CLOEXEC | flags, 0666);
+        if (*descriptor < 0)
+            return errno;
+        const int taken = flock(*descriptor, LOCK_EX | LOCK_NB) ? errno : 0;
+        if (taken != EWOULDBLOCK && !fstat(*descriptor, &held) && !stat(whole->beside, &named) && held.st_dev == named.st_dev &&
+            held.st_ino == named.st_ino)
+            return 0; // disks that know no locks: one builds at a time, as everywhere before
+        close(*descriptor);
+        if (taken == EWOULDBLOCK)
+            return taken;
+    }
+}
+
+// What others left beside and nobody writes any more.
+static void remove_left(const struct pt_whole *whole, int own)
+{
+    int descriptor;
+    for (int slot = 0; slot < SLOTS; slot++) {
+        name_slot(whole, slot);
+        if (slot != own && !take_slot(whole, 0, &descriptor)) {
+            unlink(whole->beside);
+            close(descriptor);
+        }
+    }
+    name_slot(whole, own);
+}
+
 int pt_whole_begin(const char *path, struct pt_whole *whole)
 {
-    static const char part[] = ".part";
     const size_t length = strlen(path);
     struct stat status;
     *whole = (struct pt_whole){0};
     if (!stat(path, &status) && !S_ISREG(status.st_mode)) // never in the place of a folder or a device
         return S_ISDIR(status.st_mode) ? EISDIR : EINVAL;
-    char *names = malloc(2 * length + 1 + sizeof part);
+    char *names = malloc(2 * length + 1 + sizeof ".part0");
     if (!names)
         return ENOMEM;
     whole->path = memcpy(names, path, length + 1);
-    whole->beside = memcpy(names + length + 1, path, length);
-    memcpy(whole->beside + length, part, sizeof part);
-    whole->stream = pt_stream_open(whole->beside, "wb");
-    if (whole->stream) {
-        errno = 0; // of what is written from now on
-        return 0;
+    whole->beside = names + length + 1;
+    int descriptor = -1, error = EWOULDBLOCK, slot = 0;
+    for (; slot < SLOTS && error == EWOULDBLOCK; slot++) {
+        name_slot(whole, slot);
+        error = take_slot(whole, O_CREAT, &descriptor);
     }
-    int error = errno;
+    if (!error) {
+        remove_left(whole, slot - 1);
+        whole->lock = fcntl(descriptor, F_DUPFD_CLOEXEC, 0);
+        error = whole->lock < 0 || ftruncate(descriptor, 0) ? errno : 0;
+        whole->stream = error ? NULL : fdopen(descriptor, "wb");
+        if (whole->stream) {
+            errno = 0; // of what is written from now on
+            return 0;
+        }
+        error = error ? error : errno;
+        close(descriptor);
+    }
     free(names);
-    return error;
+    return error == EWOULDBLOCK ? EBUSY : error;
 }
 
 int pt_whole_end(struct pt_whole *whole, int good)
@@ -307,6 +419,7 @@ int pt_whole_end(struct pt_whole *whole, int good)
         error = errno;
     if (error)
         pt_file_remove(whole->beside);
+    close((int)whole->lock); // nobody else took the name before
     free(whole->path);
     return error;
 }

@@ -367,10 +367,115 @@ int pt_file_remove(const char *path)
     return error;
 }
 
+// A name beside `path` that no other call has: path.PROCESS-NUMBER.ending.
+static char *name_beside(const char *path, const char *ending)
+{
+    static atomic_uint number;
+    const size_t size = strlen(path) + 48;
+    char *name = malloc(size);
+    if (name)
+        snprintf(name, size, "%s.%lu-%u%s", path, (unsigned long)GetCurrentProcessId(), atomic_fetch_add(&number, 1), ending);
+    return name;
+}
+
+static int lives(unsigned long process)
+{
+    const HANDLE handle = OpenProcess(SYNCHRONIZE, FALSE, process);
+    const int alive = handle ? WaitForSingleObject(handle, 0) == WAIT_TIMEOUT : GetLastError() == ERROR_ACCESS_DENIED;
+    if (handle)
+        CloseHandle(handle);
+    return alive;
+}
+
+// What processes that live no longer left beside the file.
+static void remove_left(const wchar_t *wide)
+{
+    const size_t length = wcslen(wide);
+    wchar_t *all = malloc((length + 1 + MAX_PATH + 16) * sizeof *all);
+    size_t folder = length;
+    while (folder && wide[folder - 1] != L'\\' && wide[folder - 1] != L'/')
+        folder--;
+    WIN32_FIND_DATAW found;
+    if (!all)
+        return;
+    memcpy(all, wide, length * sizeof *all);
+    memcpy(all + length, L".*.part", 8 * sizeof *all);
+    const HANDLE search = FindFirstFileW(all, &found);
+    if (search != INVALID_HANDLE_VALUE) {
+        do {
+            const size_t own = length - folder;
+            wchar_t *end;
+            if (wcslen(found.cFileName) <= own + 1)
+                continue;
+            const unsigned long process = wcstoul(found.cFileName + own + 1, &end, 10);
+            if (*end != L'-' || lives(process))
+                continue;
+            memcpy(all + folder, found.cFileName, (wcslen(found.cFileName) + 1) * sizeof *all);
+            DeleteFileW(all);
+        } while (FindNextFileW(search, &found));
+        FindClose(search);
+    }
+    free(all);
+}
+
+int pt_disk_spill(const char *path, struct pt_disk *disk)
+{
+    int error = ENOMEM;
+    char *name = name_beside(path, ".spill");
+    wchar_t *wide = name ? wide_path(name, &error) : NULL;
+    free(name);
+    if (!wide)
+        return error;
+    const HANDLE handle = CreateFileW(wide, GENERIC_READ | GENERIC_WRITE, 0, NULL, CREATE_NEW,
+                                      FILE_ATTRIBUTE_TEMPORARY | FILE_FLAG_DELETE_ON_CLOSE, NULL);
+    error = handle == INVALID_HANDLE_VALUE ? last_error() : 0;
+    free(wide);
+    *disk = (struct pt_disk){.handle = (intptr_t)handle, .kind = PT_DISK_FILE};
+    return error;
+}
+
+int pt_disk_write(struct pt_disk *disk, uint64_t offset, const void *data, size_t size)
+{
+    for (size_t done = 0; done < size;) {
+        const size_t left = size - done;
+        const uint64_t at = offset + done;
+        OVERLAPPED to = {.Offset = (DWORD)at, .OffsetHigh = (DWORD)(at >> 32)};
+        DWORD now = 0;
+        if (!WriteFile((HANDLE)disk->handle, (const char *)data + done, (DWORD)(left < 1u << 30 ? left : 1u << 30), &now, &to))
+            return last_error();
+        if (!now)
+            return ENOSPC;
+        done += now;
+    }
+    disk->size = disk->size > offset + size ? disk->size : offset + size;
+    return 0;
+}
+
+int pt_disk_room(const char *path, uint64_t *bytes)
+{
+    const size_t length = strlen(path);
+    size_t folder = length;
+    while (folder && path[folder - 1] != '\\' && path[folder - 1] != '/')
+        folder--;
+    char *name = malloc(folder + 2);
+    if (!name)
+        return ENOMEM;
+    memcpy(name, folder ? path : ".", folder ? folder : 1);
+    name[folder ? folder : 1] = 0;
+    ULARGE_INTEGER free_bytes = {0};
+    int error;
+    wchar_t *wide = wide_path(name, &error);
+    free(name);
+    if (!wide)
+        return error;
+    error = GetDiskFreeSpaceExW(wide, &free_bytes, NULL, NULL) ? 0 : last_error();
+    free(wide);
+    *bytes = free_bytes.QuadPart;
+    return error;
+}
+
 int pt_whole_begin(const char *path, struct pt_whole *whole)
 {
-    static const char part[] = ".part";
-    const size_t length = strlen(path);
     int error;
     *whole = (struct pt_whole){0};
     wchar_t *wide = wide_path(path, &error);
@@ -378,22 +483,21 @@ int pt_whole_begin(const char *path, struct pt_whole *whole)
         return error;
     const DWORD there = GetFileAttributesW(wide);
     error = is_device(wide) ? EINVAL : there != INVALID_FILE_ATTRIBUTES && there & FILE_ATTRIBUTE_DIRECTORY ? EISDIR : 0;
+    if (!error)
+        remove_left(wide);
     free(wide);
     if (error) // never in the place of a folder or a device
         return error;
-    char *names = malloc(2 * length + 1 + sizeof part);
-    if (!names)
-        return ENOMEM;
-    whole->path = memcpy(names, path, length + 1);
-    whole->beside = memcpy(names + length + 1, path, length);
-    memcpy(whole->beside + length, part, sizeof part);
-    whole->stream = pt_stream_open(whole->beside, "wb");
+    whole->path = _strdup(path);
+    whole->beside = name_beside(path, ".part");
+    whole->stream = whole->path && whole->beside ? pt_stream_open(whole->beside, "wb") : NULL;
     if (whole->stream) {
         errno = 0; // of what is written from now on
         return 0;
     }
-    error = errno;
-    free(names);
+    error = whole->path && whole->beside ? errno : ENOMEM;
+    free(whole->path);
+    free(whole->beside);
     return error;
 }
 
@@ -430,6 +534,7 @@ int pt_whole_end(struct pt_whole *whole, int good)
     if (error)
         pt_file_remove(whole->beside);
     free(whole->path);
+    free(whole->beside);
     return error;
 }
 
