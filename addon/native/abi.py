@@ -191,6 +191,11 @@ class Panorama(Descriptor):
                 ("near_clip", c_double), ("far_clip", c_double)]
 
 
+class BuilderDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("memory", c_uint64), ("count", c_uint64), ("box_min", c_double * 3),
+                ("box_max", c_double * 3), ("threads", c_uint32), ("narrow_colors", c_uint32)]
+
+
 class FileInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32), ("origin", c_double * 3),
@@ -344,6 +349,10 @@ CALLS = {
     "patina_panorama_camera": (POINTER(Panorama), c_uint32, POINTER(Camera), c_void_p),
     "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
     "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
+    "patina_builder_begin": (c_char_p, POINTER(BuilderDesc), POINTER(c_void_p)),
+    "patina_builder_add": (c_void_p, POINTER(CloudDesc)),
+    "patina_builder_end": (c_void_p, c_void_p),
+    "patina_builder_destroy": (c_void_p,),
     "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
     "patina_file_destroy": (c_void_p,),
@@ -397,6 +406,7 @@ CALLS = {
     "patina_task_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p, POINTER(c_void_p)),
     "patina_task_open_file": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_task_save": (c_void_p, c_char_p, POINTER(c_void_p)),
+    "patina_task_end_build": (c_void_p, c_void_p, POINTER(c_void_p)),
     "patina_task_verify": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_task_done": (c_void_p,),
     "patina_task_wait": (c_void_p,),
@@ -409,9 +419,9 @@ RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_me
            "patina_progress_value": c_float, "patina_device_destroy": None, "patina_cloud_destroy": None,
            "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
            "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
-           "patina_file_destroy": None, "patina_mesh_destroy": None, "patina_texture_destroy": None,
-           "patina_mask_destroy": None, "patina_grade_destroy": None, "patina_scans_destroy": None,
-           "patina_field_destroy": None, "patina_task_destroy": None}
+           "patina_builder_destroy": None, "patina_file_destroy": None, "patina_mesh_destroy": None,
+           "patina_texture_destroy": None, "patina_mask_destroy": None, "patina_grade_destroy": None,
+           "patina_scans_destroy": None, "patina_field_destroy": None, "patina_task_destroy": None}
 
 # effects.def: what Blender shows of each effect, and how
 EFFECTS = (

@@ -30,6 +30,7 @@ struct patina_task {
     uint32_t page;
     patina_cloud *cloud; // built, until it is taken
     char *path;          // its own copy
+    patina_builder *builder;
     const patina_cloud *saved;
     patina_file *file; // opened, until it is taken
     patina_analysis_desc analyse;
@@ -95,6 +96,8 @@ static int give_page(struct patina_task *task) { return patina_cloud_page_give(t
 static int open_file(struct patina_task *task) { return patina_file_open(task->path, task->progress, &task->file); }
 
 static int save(struct patina_task *task) { return patina_cloud_save(task->saved, task->path); }
+
+static int end_build(struct patina_task *task) { return patina_builder_end(task->builder, task->progress); }
 
 static int verify(struct patina_task *task) { return patina_cloud_verify(task->path, task->progress); }
 
@@ -212,6 +215,14 @@ int patina_task_open_file(const char *path, patina_progress *progress, patina_ta
 int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out)
 {
     return start_at(&(struct patina_task){.work = save, .saved = cloud}, path, out);
+}
+
+int patina_task_end_build(patina_builder *builder, patina_progress *progress, patina_task **out)
+{
+    if (!builder)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_end_build: builder is NULL");
+    const struct patina_task task = {.work = end_build, .builder = builder, .progress = progress};
+    return start(&task, out);
 }
 
 int patina_task_verify(const char *path, patina_progress *progress, patina_task **out)

@@ -76,6 +76,19 @@ static uint8_t read_opacity(const patina_array *array, uint64_t index)
     return isnan(value) ? 255 : (uint8_t)(255.0 * fmin(fmax(value, 0.0), 1.0) + 0.5);
 }
 
+void pt_cloud_position(const patina_cloud_desc *desc, uint64_t index, double p[3])
+{
+    pt_read_vector(&desc->position, index, p);
+    for (int i = 0; i < 3; i++)
+        p[i] += desc->origin[i];
+}
+
+// Points of opacity 0 would be layers that show nothing.
+int pt_cloud_draws(const patina_cloud_desc *desc, uint64_t index, const double p[3])
+{
+    return finite3(p) && (!desc->opacity.data || read_opacity(&desc->opacity, index));
+}
+
 // ---- the build -----------------------------------------------------------------------------------------------------
 
 struct build {
@@ -107,17 +120,11 @@ struct build {
 
 enum { BLOCK_POINTS = 1 << 16, LEAST_POINTS = 16, SMALL_CLOUD = 1 << 15 };
 
-static void position(const struct build *build, uint64_t index, double p[3])
-{
-    pt_read_vector(&build->desc.position, index, p);
-    for (int i = 0; i < 3; i++)
-        p[i] += build->desc.origin[i];
-}
+static void position(const struct build *build, uint64_t index, double p[3]) { pt_cloud_position(&build->desc, index, p); }
 
-// Points of opacity 0 would be layers that show nothing.
 static int is_drawn(const struct build *build, uint64_t index, const double p[3])
 {
-    return finite3(p) && (!build->desc.opacity.data || read_opacity(&build->desc.opacity, index));
+    return pt_cloud_draws(&build->desc, index, p);
 }
 
 static void box_reset(double box_min[3], double box_max[3])
@@ -253,7 +260,7 @@ static int refine_range(struct build *build, uint32_t begin, uint32_t end, int d
 // a scan is sparse or has strays. 8 x 8 x 8 cells when they hold 256 points each on average, fewer for small clouds.
 static int find_cells(struct build *build)
 {
-    while (build->kind == PT_BUILD_FREELY && build->cell_bits < 3 && build->drawn >> (3 * build->cell_bits + 3) >= 256)
+    while (build->kind != PT_BUILD_EVENLY && build->cell_bits < 3 && build->drawn >> (3 * build->cell_bits + 3) >= 256)
         build->cell_bits++;
     uint32_t count = 1u << 3 * build->cell_bits, shift = 62 - 3 * build->cell_bits;
     build->cells = malloc((count + 1) * sizeof *build->cells);
@@ -356,31 +363,6 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 }
 
 // ---- normals -------------------------------------------------------------------------------------------------------
-
-void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface)
-{
-    double axis[3] = {0.0, 0.0, 0.0}, n[3], cosine = 1.0;
-    chunk->cone_cosine = -2.0f;
-    for (uint32_t i = 0; i < chunk->count; i++) {
-        if ((surface[i] & PT_NORMAL_BITS) == PT_NORMAL_NONE)
-            return;
-        pt_decode_normal(surface[i] & PT_NORMAL_BITS, n);
-        for (int k = 0; k < 3; k++)
-            axis[k] += n[k];
-    }
-    double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
-    if (!(length > 0.0))
-        return;
-    for (int k = 0; k < 3; k++) {
-        axis[k] /= length;
-        chunk->cone_axis[k] = (float)axis[k];
-    }
-    for (uint32_t i = 0; i < chunk->count; i++) {
-        pt_decode_normal(surface[i] & PT_NORMAL_BITS, n);
-        cosine = fmin(cosine, n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2]);
-    }
-    chunk->cone_cosine = (float)(cosine - 1e-6);
-}
 
 // Rounds every valid normal of the chunk's points into surface words; the cone is that of the rounded normals.
 static void surface_chunk(struct build *build, uint32_t index)
@@ -591,17 +573,15 @@ static int build_cloud(struct build *build)
     if (error || (error = cut_chunks(build)) || (error = allocate(build)))
         return error;
     pt_parallel(build->pool, cloud->chunk_count, 1, fill_chunks, build);
-    if ((error = pt_cloud_settle_spacing(cloud)))
+    if (build->kind != PT_BUILD_PART && (error = pt_cloud_settle_built(cloud)))
         return error;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
-        cloud->chunks[c].built = cloud->chunks[c].spacing;
-    cloud->built = cloud->info.spacing;
     pt_parallel(build->pool, cloud->chunk_count, 1, surface_chunks, build);
     pt_progress_set(build->progress, 0.9);
     pt_parallel(build->pool, cloud->chunk_count, 1, attribute_chunks, build);
     if (pt_progress_cancelled(build->progress))
         return PATINA_ERROR_CANCELLED;
-    drop_opaque(cloud, build);
+    if (build->kind != PT_BUILD_PART)
+        drop_opaque(cloud, build);
     if ((error = pt_cloud_take_values(cloud, &build->desc)))
         return error;
     for (uint32_t b = 0; b < build->block_count; b++)
@@ -619,7 +599,7 @@ static int build_cloud(struct build *build)
     return PATINA_OK;
 }
 
-static int check_desc(patina_cloud_desc *desc)
+int pt_cloud_check_desc(patina_cloud_desc *desc)
 {
     const uint32_t floats = 1u << PATINA_FLOAT32 | 1u << PATINA_FLOAT64;
     int error;
@@ -649,40 +629,28 @@ static enum pt_color_format color_format(const patina_array *color)
     return pt_color_format_of(color->data ? color->type : (uint32_t)PATINA_NONE);
 }
 
-int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progress, patina_cloud **out)
+void pt_cloud_begin_info(struct patina_cloud *cloud, const patina_cloud_desc *desc)
 {
-    return pt_cloud_build(given, PT_BUILD_FREELY, progress, out);
+    cloud->threads = desc->threads;
+    cloud->info = (patina_cloud_info){.struct_size = sizeof cloud->info,
+                                      .count = desc->count,
+                                      .has_normals = desc->normal.data != NULL,
+                                      .normals_oriented = desc->normal.data != NULL,
+                                      .has_colors = desc->color.data != NULL,
+                                      .has_opacities = desc->opacity.data != NULL,
+                                      .has_radii = desc->radius.data != NULL};
+    memcpy(cloud->info.origin, desc->origin, sizeof desc->origin);
+    cloud->color_format = color_format(&desc->color);
 }
 
-int pt_cloud_build(const patina_cloud_desc *given, enum pt_build_kind kind, patina_progress *progress, patina_cloud **out)
+int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, struct pt_pool *pool, struct patina_progress *progress,
+                   struct patina_cloud **out)
 {
-    struct build build = {.progress = progress, .kind = kind};
-    if (!out)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: out is NULL");
-    *out = NULL;
-    if (!given)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: desc is NULL");
-    int error = pt_take(NULL, "patina_cloud_create", given, &build.desc, sizeof build.desc);
-    error = error ? error : check_desc(&build.desc);
-    if (error)
-        return error;
-
-    const patina_cloud_desc *desc = &build.desc;
-    struct patina_cloud *cloud = pt_cloud_new();
-    build.pool = pt_pool_create(pt_pool_threads_for(build.desc.threads, build.desc.count), 0);
-    error = PATINA_ERROR_MEMORY;
-    if (cloud && build.pool) {
-        cloud->threads = desc->threads;
-        cloud->info = (patina_cloud_info){.struct_size = sizeof cloud->info,
-                                          .count = desc->count,
-                                          .has_normals = desc->normal.data != NULL,
-                                          .normals_oriented = desc->normal.data != NULL,
-                                          .has_colors = desc->color.data != NULL,
-                                          .has_opacities = desc->opacity.data != NULL,
-                                          .has_radii = desc->radius.data != NULL};
-        memcpy(cloud->info.origin, desc->origin, sizeof desc->origin);
-        cloud->color_format = color_format(&desc->color);
-        build.cloud = cloud;
+    struct build build = {.kind = kind, .desc = *desc, .pool = pool, .progress = progress};
+    int error = PATINA_ERROR_MEMORY;
+    *out = build.cloud = pool ? pt_cloud_new() : NULL;
+    if (build.cloud) {
+        pt_cloud_begin_info(build.cloud, desc);
         error = build_cloud(&build);
     }
     pt_pages_free(build.words, (size_t)build.drawn * sizeof *build.words);
@@ -691,16 +659,39 @@ int pt_cloud_build(const patina_cloud_desc *given, enum pt_build_kind kind, pati
     free(build.tallies);
     free(build.cells);
     free(build.begins);
-    pt_pool_destroy(build.pool);
     if (error) {
-        patina_cloud_destroy(cloud);
-        return error == PATINA_ERROR_CANCELLED ? pt_fail(NULL, error, "building the cloud was cancelled")
-               : error == PATINA_ERROR_TOO_MANY_POINTS
-                   ? pt_fail(NULL, error, "a cloud of %llu points: too many, split it", (unsigned long long)desc->count)
-                   : pt_fail(NULL, error, "building a cloud of %llu points: out of memory", (unsigned long long)desc->count);
+        patina_cloud_destroy(*out);
+        *out = NULL;
     }
-    *out = cloud;
-    return PATINA_OK;
+    return error;
+}
+
+int pt_cloud_tell(int error, uint64_t points)
+{
+    const unsigned long long count = points;
+    return !error                            ? PATINA_OK
+           : error == PATINA_ERROR_CANCELLED ? pt_fail(NULL, error, "building the cloud was cancelled")
+           : error == PATINA_ERROR_TOO_MANY_POINTS
+               ? pt_fail(NULL, error, "a cloud of %llu points: too many, split it", count)
+               : pt_fail(NULL, error, "building a cloud of %llu points: out of memory", count);
+}
+
+int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progress, patina_cloud **out)
+{
+    patina_cloud_desc desc;
+    if (!out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: out is NULL");
+    *out = NULL;
+    if (!given)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: desc is NULL");
+    int error = pt_take(NULL, "patina_cloud_create", given, &desc, sizeof desc);
+    error = error ? error : pt_cloud_check_desc(&desc);
+    if (error)
+        return error;
+    struct pt_pool *pool = pt_pool_create(pt_pool_threads_for(desc.threads, desc.count), 0);
+    error = pt_cloud_build(&desc, PT_BUILD_FREELY, pool, progress, out);
+    pt_pool_destroy(pool);
+    return pt_cloud_tell(error, desc.count);
 }
 
 // Puts new colours in the place of the old ones; these go only when nothing can fail any more.

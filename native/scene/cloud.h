@@ -100,9 +100,6 @@ static inline uint32_t pt_number_of(const struct patina_cloud *cloud, uint64_t s
 
 // A cloud without points, whose fields are zero but for what any has; NULL without memory.
 struct patina_cloud *pt_cloud_new(void);
-// FREELY: as many chunks as the points' places ask for. EVENLY: as their number says, so that it is known before.
-enum pt_build_kind { PT_BUILD_FREELY, PT_BUILD_EVENLY };
-int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, patina_progress *progress, patina_cloud **out);
 enum pt_color_format pt_color_format_of(uint32_t type); // patina_type of a caller's colours
 
 // Points of a chunk that the first `strata` of PT_STRATA strata hold: every 2^(PT_STRATA - strata)-th in Morton order.
@@ -113,6 +110,7 @@ double pt_spacing_of_class(uint32_t index);
 uint32_t pt_class_of_spacing(double spacing, double base);
 // Sums the chunks' spacings up: the cloud's, and the base of its classes. 0 or PATINA_ERROR_MEMORY.
 int pt_cloud_settle_spacing(struct patina_cloud *cloud);
+int pt_cloud_settle_built(struct patina_cloud *cloud); // the same, of a cloud that is being built
 
 // The cone of the normals in these surface words.
 void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface);
@@ -150,6 +148,7 @@ struct pt_cloud_writer;
 int pt_cloud_writer_begin(const char *path, const struct patina_cloud *cloud, struct pt_cloud_writer **out);
 void pt_cloud_writer_add(struct pt_cloud_writer *writer, enum pt_array array, const void *data, uint64_t size);
 int pt_cloud_writer_end(struct pt_cloud_writer *writer, const struct patina_cloud *cloud);
+void pt_cloud_writer_drop(struct pt_cloud_writer *writer); // no file
 
 // Of positions, normals, spacings and opacities, whatever order they came in; never 0. Made at the first call, which reads
 // them all: only shadows ask. Any thread.
@@ -161,6 +160,18 @@ void pt_alive_release(struct pt_alive *alive);
 int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components, uint32_t most_components);
 // Three components of FLOAT32 or FLOAT64.
 void pt_read_vector(const patina_array *array, uint64_t index, double v[3]);
+
+// Building a cloud out of a checked descriptor. FREELY: as many chunks as the points' places ask for. EVENLY: as their number says, so
+// that it is known before. PART, of a larger cloud: its spacings are settled when all parts are there, so that surface words lack their
+// classes, chunks `built`, and opacities stay where all are opaque. The error is not told yet: pt_cloud_tell does it.
+enum pt_build_kind { PT_BUILD_FREELY, PT_BUILD_EVENLY, PT_BUILD_PART };
+int pt_cloud_check_desc(patina_cloud_desc *desc);
+void pt_cloud_begin_info(struct patina_cloud *cloud, const patina_cloud_desc *desc);
+int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, struct pt_pool *pool, struct patina_progress *progress,
+                   struct patina_cloud **out);
+int pt_cloud_tell(int error, uint64_t points);
+void pt_cloud_position(const patina_cloud_desc *desc, uint64_t index, double p[3]); // object units
+int pt_cloud_draws(const patina_cloud_desc *desc, uint64_t index, const double p[3]);
 
 // Sorts (code << 32 | id) words by their upper 30 bits; scratch has room for as many. The result is in words.
 int pt_morton_sort(struct pt_pool *pool, uint64_t *words, uint64_t *scratch, uint32_t count);

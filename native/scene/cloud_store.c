@@ -163,6 +163,14 @@ int pt_cloud_writer_end(struct pt_cloud_writer *writer, const struct patina_clou
     return code;
 }
 
+void pt_cloud_writer_drop(struct pt_cloud_writer *writer)
+{
+    for (int i = 0; i < SECTIONS; i++)
+        free(writer->piece[i]);
+    pt_whole_end(&writer->whole, 0);
+    free(writer);
+}
+
 static int save(const patina_cloud *cloud, const char *path)
 {
     struct patina_cloud copy = *cloud;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Normals in 26 bits: the octahedral map, 8191 steps a side.
 #include "cloud.h"
+#include "shared/words.h"
 
 #include <math.h>
 
@@ -41,4 +42,29 @@ uint32_t pt_encode_normal(const double n[3])
         }
     }
     return word;
+}
+
+void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface)
+{
+    double axis[3] = {0.0, 0.0, 0.0}, n[3], cosine = 1.0;
+    chunk->cone_cosine = -2.0f;
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        if ((surface[i] & PT_NORMAL_BITS) == PT_NORMAL_NONE)
+            return;
+        pt_decode_normal(surface[i] & PT_NORMAL_BITS, n);
+        for (int k = 0; k < 3; k++)
+            axis[k] += n[k];
+    }
+    double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+    if (!(length > 0.0))
+        return;
+    for (int k = 0; k < 3; k++) {
+        axis[k] /= length;
+        chunk->cone_axis[k] = (float)axis[k];
+    }
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        pt_decode_normal(surface[i] & PT_NORMAL_BITS, n);
+        cosine = fmin(cosine, n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2]);
+    }
+    chunk->cone_cosine = (float)(cosine - 1e-6);
 }

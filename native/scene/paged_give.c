@@ -85,12 +85,16 @@ int patina_cloud_page_give(patina_cloud *cloud, uint32_t index, const patina_clo
     int error = pt_take(&cloud->handle, "patina_cloud_page_give", desc, &checked, sizeof checked);
     if (error || (error = check_promise(cloud, index, &checked)))
         return error;
+    if ((error = pt_cloud_check_desc(&checked)))
+        return pt_fail_again(&cloud->handle, error);
     struct pt_page *page = &cloud->paged->pages[index];
     int absent = PT_PAGE_ABSENT;
     if (!atomic_compare_exchange_strong(&page->state, &absent, PT_PAGE_COMING))
         return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "page %u is there already", index);
     checked.threads = 1; // pages come side by side
-    error = pt_cloud_build(&checked, PT_BUILD_EVENLY, NULL, &made);
+    struct pt_pool *pool = pt_pool_create(checked.threads, 0);
+    error = pt_cloud_tell(pt_cloud_build(&checked, PT_BUILD_EVENLY, pool, NULL, &made), checked.count);
+    pt_pool_destroy(pool);
     error = error ? pt_fail_again(&cloud->handle, error) : check_page(cloud, index, made);
     if (!error) {
         copy_page(cloud, page, made);

@@ -107,6 +107,16 @@ int pt_cloud_settle_spacing(struct patina_cloud *cloud)
     return PATINA_OK;
 }
 
+int pt_cloud_settle_built(struct patina_cloud *cloud)
+{
+    if (pt_cloud_settle_spacing(cloud))
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        cloud->chunks[c].built = cloud->chunks[c].spacing;
+    cloud->built = cloud->info.spacing;
+    return PATINA_OK;
+}
+
 double pt_spacing_of_class(uint32_t index) { return index ? pt_exp2(((double)index - 1.0) / 4.0) : 0.0; }
 
 uint32_t pt_class_of_spacing(double spacing, double base) // rounded up: a layer distance may be too wide, not too narrow

@@ -775,6 +775,7 @@ PATINA_API int patina_panorama_join_keys(const patina_panorama *panorama, const 
 #endif
 
 // The rest of the manual, which this header includes.
+#include "builder.h"
 #include "files.h"
 #include "meshes.h"
 #include "pages.h"

@@ -47,7 +47,9 @@ PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_pro
                                         patina_task **out);                                           // patina_grid_normals
 PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
 PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
-PATINA_API int patina_task_verify(const char *path, patina_progress *progress, patina_task **out);    // patina_cloud_verify
+PATINA_API int patina_task_end_build(patina_builder *builder, patina_progress *progress,
+                                     patina_task **out);                                           // patina_builder_end
+PATINA_API int patina_task_verify(const char *path, patina_progress *progress, patina_task **out); // patina_cloud_verify
 PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block
 // Waits for the end and returns what the call returned; its message is at the task.
 PATINA_API int patina_task_wait(patina_task *task);

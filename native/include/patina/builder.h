@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Saved clouds of more points than memory holds, a part of patina.h, which includes it. Its conventions and thread rules hold here too.
+#ifndef PATINA_BUILDER_H
+#define PATINA_BUILDER_H
+
+#ifndef PATINA_H
+#error "include patina/patina.h"
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Builds a file that patina_cloud_open maps, from points that come piece by piece: they are sorted on the disk. The file has the chunks that
+// patina_cloud_create would make, to some digits the same picture; from a million points on it is made in levels, coarse ones first. Where
+// all fits in memory and there is one level, its bytes are those that patina_cloud_save would write. No analysis (patina_cloud_analyse).
+typedef struct patina_builder patina_builder;
+
+typedef struct patina_builder_desc {
+    size_t struct_size;
+    uint64_t
+        memory; // bytes that it takes at most, 16 MiB at least; 0 = a third of what is free. A chunk of work less than 4096
+                // points does not go below what these need
+    uint64_t
+        count; // of all points, as far as known: the disk is asked for room for so many before anything is written; 0 = not known
+    double box_min[3],
+        box_max[3];   // of all points, object units, as far as known; equal = not known. Wrong ones cost time alone
+    uint32_t threads; // 0 = one per core
+    uint32_t
+        narrow_colors; // 1 = UINT16 colours that 8 bits hold (all up to 255; or all low bytes zero; or all as their high bytes) become
+                       // bytes: 3 bytes a point at rest, not 12
+} patina_builder_desc;
+
+// The file gets its name at the end, whole or not at all. Beside it lies, without a name, what is sorted: about 40 bytes a point and once
+// more what the file takes. A killed process leaves at most a part of a file beside it, that the next build of it removes. Several
+// processes may build one file at a time: the last to end has it. desc may be NULL. PATINA_ERROR_FILE where the disk lacks room.
+PATINA_API int patina_builder_begin(const char *path, const patina_builder_desc *desc, patina_builder **out);
+// The next points: numbered in the order that they come in. Arrays are copied; which there are, their types and the origin are those of
+// the first piece with any points. threads is ignored. At most 2147483647 points in all.
+PATINA_API int patina_builder_add(patina_builder *builder, const patina_cloud_desc *piece);
+// Writes the file; once, and nothing may be added then. progress: may be NULL; stops it too. After an error there is no file but the
+// one that was there before.
+PATINA_API int patina_builder_end(patina_builder *builder, patina_progress *progress);
+PATINA_API void patina_builder_destroy(patina_builder *builder); // without an end: nothing was built. NULL is fine
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
