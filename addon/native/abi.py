@@ -146,7 +146,7 @@ class Settings(Descriptor):
                 ("shadow_progressive", c_uint32), ("shadow_error", c_float), ("own_background", c_uint32),
                 ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32), ("pixel_samples", c_uint32),
                 ("depth", c_uint32), ("world_directed", c_uint32), ("world_light", c_float * 27),
-                ("pixel_progressive", c_uint32), ("pixel_noise", c_float), ("average", c_uint32)]
+                ("pixel_progressive", c_uint32), ("pixel_noise", c_float), ("average", c_uint32), ("detail", c_float)]
 
 
 class Effects(Descriptor):

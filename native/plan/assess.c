@@ -26,11 +26,11 @@ void pt_plan_assess(struct pt_builder *builder)
                                .crop_width = plan->crop[2],
                                .first = 1,
                                .certainty = asked >> PATINA_PASS_CERTAINTY & 1u,
-                               .thickness = asked >> PATINA_PASS_THICKNESS & 1u,
-                               .sigma_scale = pt_sigma_scale(builder->scene)};
+                               .thickness = asked >> PATINA_PASS_THICKNESS & 1u};
     for (uint32_t i = 0; i < plan->instance_count && asked; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         const patina_cloud_info *info = &instance->instance->cloud->info;
+        args.sigma_scale = pt_sigma_scale(instance);
         uint32_t part[4];
         if (!instance->chunk_count || !info->has_shapes || !part_of_crop(plan, instance, part))
             continue;

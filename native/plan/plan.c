@@ -90,7 +90,7 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
     const int thick = pt_has_sigmas(plan, instance);
     struct surface_args args = {.view = pt_view_of(plan, instance, 0),
                                 .instance = instance->args,
-                                .sigma_scale = thick ? pt_sigma_scale(builder->scene) : 0.0f,
+                                .sigma_scale = thick ? pt_sigma_scale(instance) : 0.0f,
                                 .with_span = plan->sigmas != 0};
     if (instance->discs && plan->layers > 1)
         join_discs(instance, &args);

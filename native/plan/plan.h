@@ -204,6 +204,7 @@ struct pt_plan_light {
 struct pt_plan_instance {
     const struct pt_instance *instance;
     uint32_t of;                  // its place in the scene: shadows are kept by it
+    double thinned;               // how much farther apart than its cloud's the points that are drawn lie
     uint32_t discs;               // 1: its points are discs, or range images: what pixels show is in planes
     const struct pt_range *range; // range images: their image buffer (ranges.h); NULL: they are none
     struct instance_args args;
@@ -344,8 +345,11 @@ static inline double pt_thinning(const struct patina_scene *scene)
     return strata ? sqrt((double)(1u << (PT_STRATA - strata))) : 1.0;
 }
 
-// Times an instance's spacing of a class of sigma: a thickness, world units. Strata that are left out make nothing thicker.
-static inline float pt_sigma_scale(const struct patina_scene *scene) { return (float)(1.0 / (16.0 * pt_thinning(scene))); }
+// Times an instance's spacing of a class of sigma: a thickness, world units. What is left out makes nothing thicker.
+static inline float pt_sigma_scale(const struct pt_plan_instance *instance)
+{
+    return (float)(1.0 / (16.0 * instance->thinned));
+}
 
 // Is there anything in view that is no soft point?
 static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->triangles; }

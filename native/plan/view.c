@@ -7,6 +7,7 @@
 // picture's edge: a region is a crop of the whole, to the bit (SPEC 2.5).
 #include "plan.h"
 
+#include "detail.h"
 #include "expected.h"
 #include "eye.h"
 #include "lines.h"
@@ -137,6 +138,7 @@ struct survey {
     uint32_t *seen_count;
     int points, discs;   // some chunk's points are drawn as such
     struct cells *cells; // per instance
+    double *thinned;     // per instance: how much farther apart than its cloud's the points that are drawn lie
 };
 
 static int is_transparent(const struct pt_instance *instance)
@@ -184,6 +186,8 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     survey->seen[i] = list;
     survey->sieves[i] = pt_sieve_make(scene, instance, PT_SOLID_POINTS, clips);
     const int ranges = pt_draws_ranges(scene, instance);
+    struct pt_detail detail;
+    pt_detail_begin(scene, plan, instance, &detail);
     const double apart = pt_thinning(scene), wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
     double rows[9];
     pt_object_rows(camera, object, rows);
@@ -204,21 +208,24 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (!pt_chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), 0,
                              &seen.extent))
             continue;
+        const double pixel = pt_most(camera->xs, camera->ys), middle = seen.extent.z_middle;
+        const double before = camera->orthographic ? 1.0 : pt_most(seen.extent.z_before, 0.0);
+        double left_out, rim;
+        if (!pt_detail_draws(&detail, chunk, pixel * before / object->scale, &left_out))
+            continue;
         if (!pt_plan_page(cloud, c, camera, object, &seen.extent))
             continue;
-        double rim;
         const double stretch = stretch_of(camera, &seen.extent, &rim);
         for (int k = 0; k < 4; k++)
             seen.extent.rect[k] -= AROUND;
         seen.cull = cull && facing == FACES_BOTH;
         seen.away = facing == FACES_AWAY && !layered && !ranges;
-        const double pixel = pt_most(camera->xs, camera->ys), middle = seen.extent.z_middle;
         double footprint = pixel * (camera->orthographic ? 1.0 : middle);
         // a lamp sees a plate before a floor in one chunk: light leaks where the nearer of both has holes
         double nearest = plan->map && !camera->orthographic ? pixel * pt_most(2.0 * middle - seen.extent.z_beyond, 0.5 * middle)
                                                             : footprint;
         uint32_t count = pt_drawn_points(scene, chunk);
-        double thinned = sqrt((double)chunk->count / count);
+        double thinned = left_out * sqrt((double)chunk->count / count);
         // range images need no analysis, so that none may change them: nor may the normals that it finds
         seen.spacing_px = ranges ? thinned * (double)chunk->built * object->scale / nearest
                                  : thinned * (double)chunk->spacing * object->scale / nearest *
@@ -227,11 +234,12 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         seen.area_px = pt_least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
         const double reach = disc_reach(scene, instance, object, chunk, apart, 0) * stretch;
         seen.wide = ranges || scene->settings.surface == PATINA_SURFACE_SPLATS || reach > wide * pixel * rim ||
-                    (reach > 0.0 && seen.spacing_px > SPARSE * pt_finer(scene));
+                    (reach > 0.0 && seen.spacing_px > left_out * SPARSE * pt_finer(scene)); // the same as of all points
         survey->points |= !seen.wide;
         survey->discs |= seen.wide && !ranges;
         list[survey->seen_count[i]++] = seen;
     }
+    survey->thinned[i] = apart * pt_detail_thinning(&detail);
     plan->transparent |= transparent && survey->seen_count[i] > 0;
     return PATINA_OK;
 }
@@ -345,17 +353,19 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
 {
     const struct pt_instance *instance = &scene->instances[i];
     const struct pt_eye *eye = range ? &range->eye : &survey->camera;
+    const double thinned = survey->thinned[i];
     const double faces = range ? (double)pt_range_reach(survey->cells[i].pixels[0]) : 0.0;
     out->range = range;
     out->instance = instance;
     out->of = i;
+    out->thinned = thinned;
     out->discs = wide;
     out->marked = pt_is_marked(instance);
-    out->radius = (float)fmin((double)instance->style.radius * pt_thinning(scene), (double)PT_DISC_MOST);
-    out->radius_most = (float)radius_most(instance, pt_thinning(scene));
+    out->radius = (float)fmin((double)instance->style.radius * thinned, (double)PT_DISC_MOST);
+    out->radius_most = (float)radius_most(instance, thinned);
     out->surface_scale = surface_scale(scene);
-    out->radius_scale = (float)fmin(survey->objects[i].scale * pt_thinning(scene), (double)PT_DISC_MOST);
-    pt_set_instance(&survey->camera, &survey->objects[i], instance, pt_thinning(scene), &out->args);
+    out->radius_scale = (float)fmin(survey->objects[i].scale * thinned, (double)PT_DISC_MOST);
+    pt_set_instance(&survey->camera, &survey->objects[i], instance, thinned, &out->args);
     out->args.id_base += id_base;
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
@@ -483,7 +493,8 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     survey->seen = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->seen);
     survey->seen_count = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->seen_count);
     survey->sieves = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->sieves);
-    if (!survey->sieves || !survey->objects || !survey->seen || !survey->seen_count)
+    survey->thinned = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->thinned);
+    if (!survey->thinned || !survey->sieves || !survey->objects || !survey->seen || !survey->seen_count)
         return PATINA_ERROR_MEMORY;
     int error = pt_eye_of(scene, &survey->camera);
     const struct pt_eye bare = survey->camera;

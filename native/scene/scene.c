@@ -425,6 +425,8 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return fail(scene, "settings: no such depth");
     if (s.average > 1)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: average %u is none of 0 and 1", s.average);
+    if (!(s.detail >= 0.0f) || !isfinite(s.detail))
+        return fail(scene, "settings: detail is negative or not finite");
     if (s.pixel_samples > 4096)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u samples a pixel; the most is 4096",
                        s.pixel_samples);

@@ -84,6 +84,7 @@ static const char usage_behind[] =
     "  --sun AZIMUTH,HEIGHT[,DIAMETER]    where from and how wide, degrees (default: over the left shoulder, sharp)\n"
     "  --depth point|surface              of a pixel: its nearest point's, or its surface's in the middle (for --dump-planes)\n"
     "  --average                          the mean of the points about a pixel's surface, not the nearest: truer, steadier\n"
+    "  --detail PIXELS                    of clouds in levels no finer ones than leave so many pixels between points (0: all)\n"
     "  --pixel-samples N                  the mean of about so many samples a pixel, 1 to 4096 (1)\n"
     "  --noise E                          as many as it takes for colours to be off by E of white at most (at most 256, or N)\n"
     "  --samples N                        of a sun with a diameter, 1 to 4096 (16)\n"

@@ -235,6 +235,7 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
 {
     patina_settings *s = &o->settings;
     uint32_t number = 0;
+    double n[1] = {0};
     int bad;
     if (!strcmp(name, "-o") || !strcmp(name, "--output"))
         bad = !*(o->output = value);
@@ -270,7 +271,10 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_count(value, 1, 4096, &s->shadow_samples);
     else if (!strcmp(name, "--pixel-samples"))
         bad = parse_count(value, 1, 4096, &s->pixel_samples);
-    else if (!strcmp(name, "--noise"))
+    else if (!strcmp(name, "--detail")) {
+        bad = parse_numbers(value, n, 1, 1) < 0 || n[0] < 0;
+        s->detail = (float)n[0];
+    } else if (!strcmp(name, "--noise"))
         bad = parse_error(value, &s->pixel_noise);
     else if (!strcmp(name, "--depth"))
         bad = parse_word(value, "point|surface", &s->depth);

@@ -2,6 +2,7 @@
 #include "town.h"
 
 #include "clouds.h"
+#include "levels.h"
 #include "scene/cloud.h"
 #include "support.h"
 
@@ -122,37 +123,58 @@ struct town {
     struct pt_cloud_writer *writer;
     uint32_t *order;
     uint8_t *colors;
-    uint32_t done;
+    uint32_t chunks; // so many are done, and slots
+    uint64_t slots;
 };
 
-static void add_quarter(struct town *town, const uint32_t place[2])
+// Chunks of a level, in every quarter; what of them is in the file follows in add_points.
+static void add_chunks(struct town *town, const struct level *level, const uint32_t place[2])
 {
     const struct patina_cloud *from = town->quarter;
     struct patina_cloud *whole = &town->whole;
     double offset[3];
     offset_of(place, offset);
-    for (uint32_t c = 0; c < from->chunk_count; c++) {
-        struct pt_chunk *chunk = &whole->chunks[town->done * from->chunk_count + c];
+    for (uint32_t c = level->chunk; c < level->chunk_end; c++) {
+        struct pt_chunk *chunk = &whole->chunks[town->chunks++];
         *chunk = from->chunks[c];
-        chunk->first += (uint32_t)(town->done * from->slots);
+        chunk->first += (uint32_t)(town->slots - level->slot);
         for (int k = 0; k < 3; k++)
             chunk->origin[k] += offset[k];
     }
+    town->slots += level->slot_end - level->slot;
     for (int k = 0; k < 3; k++) {
         whole->info.box_min[k] = fmin(whole->info.box_min[k], from->info.box_min[k] + offset[k]);
         whole->info.box_max[k] = fmax(whole->info.box_max[k], from->info.box_max[k] + offset[k]);
     }
-    for (uint64_t i = 0; i < from->slots; i++)
-        town->order[i] = from->order[i] + town->done * (uint32_t)from->info.count;
-    for (uint64_t i = 0; i < 3 * from->slots; i++) // of 256ths, another tone a quarter
-        town->colors[i] = (uint8_t)(((const uint8_t *)from->colors)[i] * (200 + (place[0] * 7 + place[1] * (5 + i % 3)) % 56) >>
-                                    8);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, from->positions, from->slots * 12);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_ORDER, town->order, from->slots * 4);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_SURFACE, from->surface, from->slots * 4);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_COLORS, town->colors, from->slots * 3);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_SHAPES, from->shapes, from->slots * 4);
-    town->done++;
+}
+
+static void add_points(struct town *town, const struct level *level, const uint32_t place[2], uint32_t number)
+{
+    const struct patina_cloud *from = town->quarter;
+    const uint64_t first = level->slot, slots = level->slot_end - first;
+    for (uint64_t i = 0; i < slots; i++)
+        town->order[i] = from->order[first + i] + number * (uint32_t)from->info.count;
+    for (uint64_t i = 3 * first; i < 3 * level->slot_end; i++) // of 256ths, another tone a quarter
+        town->colors[i - 3 * first] =
+            (uint8_t)(((const uint8_t *)from->colors)[i] * (200 + (place[0] * 7 + place[1] * (5 + i % 3)) % 56) >> 8);
+    pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, from->positions + 3 * first, slots * 12);
+    pt_cloud_writer_add(town->writer, PT_ARRAY_ORDER, town->order, slots * 4);
+    pt_cloud_writer_add(town->writer, PT_ARRAY_SURFACE, from->surface + first, slots * 4);
+    pt_cloud_writer_add(town->writer, PT_ARRAY_COLORS, town->colors, slots * 3);
+    pt_cloud_writer_add(town->writer, PT_ARRAY_SHAPES, from->shapes + first, slots * 4);
+}
+
+// Of every quarter, in the order of the file.
+static void add_level(struct town *town, const struct level *level, uint32_t across)
+{
+    uint32_t place[2];
+    for (uint32_t i = 0, done = 0; done < across * across; i++) {
+        place_of(i, place);
+        if (place[0] >= across || place[1] >= across)
+            continue;
+        add_chunks(town, level, place);
+        add_points(town, level, place, done++);
+    }
 }
 
 static void set_numbers(struct patina_cloud *whole, const patina_cloud *quarter, uint32_t quarters)
@@ -169,20 +191,19 @@ static void set_numbers(struct patina_cloud *whole, const patina_cloud *quarter,
     whole->chunks = calloc(whole->chunk_count, sizeof *whole->chunks);
 }
 
-uint64_t town_write(const char *path, uint32_t across, uint32_t points)
+uint64_t town_write(const char *path, uint32_t across, uint32_t points, uint32_t levels)
 {
     patina_cloud *quarter = make_quarter(points);
+    struct level level[LEVELS_MOST] = {{0, quarter->chunk_count, 0, quarter->slots}};
+    if (levels > 1)
+        levels_make(quarter, levels, level);
     struct town town = {.quarter = quarter, .order = malloc(quarter->slots * 4), .colors = malloc(quarter->slots * 3)};
-    uint32_t place[2];
     set_numbers(&town.whole, quarter, across * across);
     if (!town.order || !town.colors || !town.whole.chunks)
         support_die("a town: out of memory");
     CHECK(pt_cloud_writer_begin(path, &town.whole, &town.writer), NULL);
-    for (uint32_t i = 0; town.done < across * across; i++) {
-        place_of(i, place);
-        if (place[0] < across && place[1] < across)
-            add_quarter(&town, place);
-    }
+    for (uint32_t k = 0; k < (levels > 1 ? levels : 1); k++)
+        add_level(&town, &level[k], across);
     const char end[4] = {0};
     pt_cloud_writer_add(town.writer, PT_ARRAY_COLORS, end, sizeof end);
     pt_cloud_writer_add(town.writer, PT_ARRAY_CHUNKS, town.whole.chunks, town.whole.chunk_count * sizeof *town.whole.chunks);

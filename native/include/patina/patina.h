@@ -535,6 +535,9 @@ typedef struct patina_settings {
                        // points have them. Truer where several points fall into a pixel, steadier where a camera or an
                        // object moves. Not where colours come from a ramp or points have opacities of their own; discs
                        // show means either way
+    float detail;      // > 0: of clouds whose files hold them in levels, finer ones are left out where
+        // the points of the next coarser one lie at most so many pixels apart: for pictures on the way to the exact
+        // one, which read less. Not of what discs alone or range images show. 0 = all points
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "detail.h"
+
+#include "eye.h"
+#include "ranges.h"
+
+// A builder's levels need not be exactly twice as wide as the next: what lies within this of a level is of it.
+#define SAME_LEVEL 1.2
+
+void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance,
+                     struct pt_detail *detail)
+{
+    const struct patina_cloud *cloud = instance->cloud;
+    *detail = (struct pt_detail){0};
+    // Cells of range images, discs alone and maps of lights know no coarser points: a map's holes would be light.
+    if (!(scene->settings.detail > 0.0f) || plan->map || scene->settings.surface == PATINA_SURFACE_SPLATS ||
+        pt_draws_ranges(scene, instance))
+        return;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        const double gap = (double)cloud->chunks[c].gap;
+        detail->coarsest = pt_most(detail->coarsest, gap);
+        detail->finest = gap > 0.0 && !(detail->finest > 0.0 && detail->finest <= gap) ? gap : detail->finest;
+    }
+    detail->tolerance = detail->coarsest > SAME_LEVEL * detail->finest ? (double)scene->settings.detail : 0.0;
+}
+
+int pt_detail_draws(struct pt_detail *detail, const struct pt_chunk *chunk, double pixel, double *thinned)
+{
+    const double gap = (double)chunk->gap, most = detail->tolerance * pixel;
+    *thinned = 1.0;
+    if (!(detail->tolerance > 0.0) || !(gap > 0.0))
+        return 1;
+    // what the next coarser level leaves open shows no more than the tolerance
+    if (2.0 * gap <= most && SAME_LEVEL * gap < detail->coarsest)
+        return 0;
+    double finest = detail->finest;
+    while (2.0 * finest <= most && SAME_LEVEL * finest < detail->coarsest)
+        finest *= 2.0;
+    *thinned = finest / detail->finest;
+    detail->least = detail->least > 0.0 ? pt_least(detail->least, gap) : gap;
+    return 1;
+}
+
+double pt_detail_thinning(const struct pt_detail *detail)
+{
+    return detail->least > 0.0 ? pt_most(detail->least / detail->finest, 1.0) : 1.0;
+}
