@@ -33,6 +33,12 @@ def cache_bytes() -> int:
     return GIGA * (known.cache_limit if known else CACHE_GIGA)
 
 
+def cloud_bytes() -> int:
+    """How much a picture may hold of linked clouds at a time; 0: by what is free."""
+    known = get()
+    return GIGA * known.cloud_limit if known else 0
+
+
 def _use(group: PatinaPreferences, _context: Context) -> None:
     memory.limit = GIGA * group.memory_limit
 
@@ -60,6 +66,10 @@ class PatinaPreferences(AddonPreferences):
         name="Memory", default=0, min=0, soft_max=256, max=1 << 20, update=_use,
         description="Gigabytes that a final picture's planes may take before it is made in tiles")
     use_memory_limit: switch("memory_limit", 4, "A fixed number of gigabytes; else half of what is free", "Set Memory")
+    cloud_limit: IntProperty(
+        name="Linked Clouds", default=0, min=0, soft_max=256, max=1 << 20,
+        description="Gigabytes that a picture holds of linked clouds at a time; what is more is read in rounds, to the same picture")
+    use_cloud_limit: switch("cloud_limit", 4, "A fixed number of gigabytes; else a third of what is free", "Set Linked Clouds")
 
     online: BoolProperty(
         name="Allow Online Access", default=False,
@@ -83,6 +93,7 @@ class PatinaPreferences(AddonPreferences):
         column.prop(self, "device")
         rows.automatic(column, self, "threads")
         rows.automatic(column, self, "memory_limit", text="Memory (GB)")
+        rows.automatic(column, self, "cloud_limit", text="Linked Clouds (GB)")
         if not hasattr(bpy.app, "online_access"):
             column.prop(self, "online")
         column = layout.column()

@@ -44,7 +44,7 @@ def device_for(choice: DeviceChoice) -> native.Device:
     global _device
     with _device_lock:
         if _device is None or _device[0] != choice:
-            _device = (choice, native.Device(choice.name, choice.threads))
+            _device = (choice, native.Device(choice.name, choice.threads, choice.mapped))
         return _device[1]
 
 

@@ -123,8 +123,9 @@ def _handle_of(progress: Progress | None) -> c_void_p | None:
 class Device(_Handle):
     _kind = "device"
 
-    def __init__(self, name: str = "auto", threads: int = 0) -> None:
-        super().__init__(byref(abi.DeviceDesc(name=name.encode(), threads=threads)))
+    def __init__(self, name: str = "auto", threads: int = 0, mapped: int = 0) -> None:
+        """mapped: bytes that a picture holds of mapped clouds at a time; 0: a third of what is free."""
+        super().__init__(byref(abi.DeviceDesc(name=name.encode(), threads=threads, mapped_cap=mapped)))
         info = abi.DeviceInfo()
         self._call("get_info", byref(info))
         self.name = info.name.decode()

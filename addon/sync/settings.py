@@ -22,6 +22,7 @@ DEVICES = {'AUTO': "auto", 'CPU': "cpu", 'CPU_SCALAR': "cpu-scalar", 'GL': "gl-w
 class DeviceChoice:
     name: str
     threads: int
+    mapped: int = 0  # bytes that a picture holds of linked clouds at a time; 0: a third of what is free
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,8 @@ def device(scene: bpy.types.Scene) -> DeviceChoice:
     chosen = forced.get("device", scene.patina.device)
     if chosen == 'AUTO' and known and "device" not in forced:
         chosen = known.device
-    return DeviceChoice(DEVICES[chosen], forced.get("threads") or _threads(scene, known.threads if known else 0))
+    return DeviceChoice(DEVICES[chosen], forced.get("threads") or _threads(scene, known.threads if known else 0),
+                        preferences.cloud_bytes())
 
 
 def _threads(scene: bpy.types.Scene, preferred: int) -> int:

@@ -14,7 +14,7 @@ import check_linked  # noqa: F401  no test leaves files with the user
 from check_import import import_ply
 from check_linked import dense
 from harness import REPOSITORY, SCRATCH, Skip, check, new_scene, render
-from patina import importers, memory, preferences, readers
+from patina import importers, memory, native, preferences, readers
 from patina.operators import preferences as operators
 from patina.sync import cache, kept, linked, settings
 
@@ -223,6 +223,12 @@ def test_defaults_of_device_threads_and_memory():
         check(memory.for_planes() == 2 << 30, f"{memory.for_planes()}")
         scene.patina.device, scene.patina.threads = 'CPU_SCALAR', 2
         check(settings.device(scene) == settings.DeviceChoice("cpu-scalar", 2), "the scene's own come first")
+        chosen.cloud_limit = 3
+        check(settings.device(scene).mapped == 3 << 30, f"{settings.device(scene)}")
+        with native.Device("cpu", mapped=1 << 30) as device:
+            check(device.name.startswith("cpu"), f"{device.name}")
+        chosen.cloud_limit = 0
+        check(settings.device(scene).mapped == 0, "a third of what is free again")
         chosen.memory_limit = 0
         check(memory.limit == 0, "no limit again")
 
