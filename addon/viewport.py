@@ -51,6 +51,11 @@ class Wish:
     level: pace.Level
     asked: float  # when
     clips: tuple[sync.Clip, ...] = ()  # of the scene's, those of the view itself: they cut what Blender draws too
+    detail: float = pace.EXACT
+
+    def whole(self) -> bool:
+        """Whether it is what a final render would make."""
+        return self.level == pace.FULL and self.detail == pace.EXACT
 
     def description(self, clouds: list[sync.CloudItem]) -> sync.SceneDescription:
         shrink = self.level.shrink
@@ -60,8 +65,9 @@ class Wish:
             region=(x0 // shrink, y0 // shrink, -(-x1 // shrink), -(-y1 // shrink)),
             strata=pace.WHOLE if self.level.strata == pace.STRATA else self.level.strata,
             average=self.scene.settings.average if self.level.strata == pace.STRATA else 0,
+            detail=self.detail,
             shadow_lazy=0, shadow_progressive=1,  # one sample after a change of lights, refined at rest
-            pixel_samples=self.scene.settings.pixel_samples if self.level == pace.FULL else 1, pixel_progressive=1)
+            pixel_samples=self.scene.settings.pixel_samples if self.whole() else 1, pixel_progressive=1)
         lines = self.scene.lines
         if lines and not lines.world:
             lines = replace(lines, width=lines.width / shrink)
@@ -122,6 +128,7 @@ class Viewport:
         self._local = False  # in local view
         self._clips: list[sync.Clip] = []  # of the view
         self._last: Wish | None = None  # that was asked for
+        self._many = False  # points: pictures begin with what shows most of them
         self._wanted: Wish | None = None
         self._working: Wish | None = None
         self._steps: Steps[Shown] | None = None  # of the work
@@ -154,7 +161,7 @@ class Viewport:
         self._view, self._clips = view, sync.view_clips(context.region_data)
         self._local = context.space_data.local_view is not None
         self._moved = time.monotonic()
-        self._ask(self.pace.level)
+        self._ask(self.pace.level, pace.MOVING if self._many else pace.EXACT)
 
     def draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> str:
         """Draws the last picture, asks for another one if the view moved. Returns a line of status."""
@@ -167,7 +174,7 @@ class Viewport:
         if self._scene and (view != self._view or clips != self._clips):
             self._view, self._clips = view, clips
             self._moved = time.monotonic()
-            self._ask(self.pace.level)
+            self._ask(self.pace.level, pace.MOVING if self._many else pace.EXACT)
         self._await_size()
         if self.shown:
             self._draw_picture(context)
@@ -190,9 +197,9 @@ class Viewport:
             return False
         news, self._news = self._news, False
         idle = not self._working and not self._wanted
-        due = self._last is not None and self._last.level != pace.FULL
+        due = self._last is not None and not self._last.whole()
         if due and idle and time.monotonic() - self._moved > REST:
-            self._ask(pace.FULL)
+            self._ask(pace.FULL, pace.next_detail(self._last.detail))
         if news:
             try:
                 engine.is_preview  # noqa: B018  Blender may have freed it
@@ -225,13 +232,13 @@ class Viewport:
     def _read_view(self, context: bpy.types.Context) -> sync.View:
         return sync.viewport_view(context.region, context.space_data, context.region_data, context.scene)
 
-    def _ask(self, level: pace.Level) -> None:
+    def _ask(self, level: pace.Level, detail: float = pace.EXACT) -> None:
         if self._closed:
             return
         scene = replace(self._scene, clips=[*self._scene.clips, *self._clips])
-        self._wanted = self._last = Wish(scene, self._view, level, time.monotonic(), tuple(self._clips))
+        self._wanted = self._last = Wish(scene, self._view, level, time.monotonic(), tuple(self._clips), detail)
         # a quick picture of the moment before is worth its end, a whole one is not
-        if self._rendering and self._working.level == pace.FULL:
+        if self._rendering and self._working.whole():
             self._rendering.cancel()
         if self not in _TURNS:
             _TURNS.append(self)
@@ -251,6 +258,8 @@ class Viewport:
         if under_way:
             return analysis.label(under_way[0])
         stats = self.shown.stats
+        if self.shown.wish.detail > pace.EXACT and stats["points_scattered"] < stats["points"]:
+            return f"{stats['points_scattered']:,} of {stats['points']:,} points, what else is in view is on its way"
         samples = f", {stats['pixel_samples']} samples" if stats["pixel_samples"] > 1 else ""
         return f"{stats['points']:,} points, {stats['ms']:.0f} ms, {self.shown.device}{samples}{self._on_their_way()}"
 
@@ -330,7 +339,7 @@ class Viewport:
             self._wish_analyses()
             self._wish_points()
             if (shown.stats["shadow_pending"] or self._bettered) and not self._wanted:
-                self._wanted = wish  # more samples of soft shadows, or of pixels
+                self._wanted = shown.wish  # more samples of soft shadows, or of pixels
         return True
 
     def _wish_analyses(self) -> None:
@@ -397,7 +406,12 @@ class Viewport:
                         self.notices = [*self.notices, item.cloud.lost]
             finally:
                 self._progress = None
-        if self._wanted and wish.level == pace.FULL:
+        self._many = sum(item.cloud.count for item in clouds) >= pace.MANY
+        if self._many and not self.shown:
+            first = replace(wish, detail=pace.FIRST)
+            self._working, self._last = first, first if self._last is wish else self._last
+            wish = first
+        if self._wanted and wish.whole():
             raise native.PatinaCancelled("a newer picture is wanted", native.CANCELLED)
         description = wish.description(clouds)
         if not self._lost or self._lost[0] != description.device:
@@ -441,7 +455,8 @@ class Viewport:
         yield from self._hide_dots(device, dots.left_out(description, wish.clips), depth)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
-        self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
+        if not self._many or wish.detail == pace.MOVING:  # that of others says nothing of pictures while the view moves
+            self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
         behind = backdrop.pixels(description) if self._others and description.behind else None  # which is in the picture then
         bettered = Bettered(wish, parts, colors, description, behind)
         self._keep_bettering(bettered)

@@ -58,6 +58,7 @@ class Settings:
     pixel_progressive: int = 0  # the first sample, which is bettered by and by
     pixel_noise: float = 0.0
     average: int = 0
+    detail: float = 0.0  # pixels between points below which finer levels of clouds are left out; 0: all is drawn
 
 
 def read(scene: bpy.types.Scene, view: View, world: World) -> Settings:

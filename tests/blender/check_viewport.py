@@ -203,6 +203,32 @@ def test_coarse_pictures_fill_the_view():
         check(abs(pixels / whole - 1.0) < 0.02, f"{level}: {pixels} pixels of the disc, {whole} of the whole picture")
 
 
+def test_many_points_come_by_detail():
+    """Of many points the first picture leaves out most, and at rest ever finer ones follow, to the whole one; moving begins in between."""
+    many, following, details = pace.MANY, pace.next_detail, []
+    pace.MANY = 1000
+
+    def next_detail(detail):
+        details.append(detail)
+        return following(detail)
+
+    pace.next_detail = next_detail
+    try:
+        setup()
+        bpy.context.scene.render.film_transparent = False
+        positions, colors, normals = sphere(50000, 1.5, (0, 0, 0))
+        add_points(positions, colors, normals)
+        yield lambda: settled(50000)
+        check(details in ([pace.FIRST, pace.MOVING], [pace.MOVING]), f"{details}")  # a redraw between counts as a motion
+        before = shown().pictures
+        view().view_rotation = Quaternion((0, 1, 0), 0.4)
+        del details[:]
+        yield newer(before)
+        check(details and set(details) == {pace.MOVING}, f"{details}")
+    finally:
+        pace.MANY, pace.next_detail = many, following
+
+
 def test_overlays_are_hidden_by_points():
     """An empty's axes behind the points do not show, those before them do."""
     setup(overlays=True)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from harness import SCRATCH, new_scene
 from mathutils import Quaternion
-from patina import pace, viewport
+from patina import viewport
 from patina.sync.analyzing import ANALYSES
 
 KEEP = os.environ.get("PATINA_SCREENSHOTS")  # a folder that keeps them
@@ -28,7 +28,7 @@ def view():
 def shown():
     """The viewport's engine, when its whole picture is there."""
     found = viewport.of_area(area())
-    if found and found.shown and found.shown.wish.level == pace.FULL and found._last is found.shown.wish:
+    if found and found.shown and found.shown.wish.whole() and found._last is found.shown.wish:
         return found
     return None
 
