@@ -2,9 +2,10 @@
 """Clouds in files, larger than what a picture may hold of them: a terraced town with trees, written as a saved cloud (town.c, 27 bytes a
 point). Each picture is a run of the command line of its own, from a disk that holds nothing of the file in memory, and again.
 
-    build/out/venv/bin/python tests/bench/files.py [--across N] [--folder FOLDER] [--library FILE]
+    build/out/venv/bin/python tests/bench/files.py [--across N] [--folder FOLDER] [--library FILE] [--levels]
 
---across: quarters a side, of a million points each: 3, 10; 32 is a billion, and 28 GB on the disk."""
+--across: quarters a side, of a million points each: 3, 10; 32 is a billion, and 28 GB on the disk. --levels: the town lies in levels, and
+pictures leave out what is finer than so many pixels, as the viewport's first ones do."""
 
 from __future__ import annotations
 
@@ -21,6 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 QUARTER, STOREY = 40.0, 3.0  # metres: tests/scenes/town.h
 SIZE, CAPS, ROUNDS = "1920x1080", ("100G", "500M"), 3
+LEVELS, DETAILS = 5, (4.0, 1.0, 0.0)  # pixels between points; 0: all points
 
 
 @dataclass
@@ -47,11 +49,11 @@ def forget(path: Path) -> None:
     os.close(descriptor)
 
 
-def draw(patina: Path, cloud: Path, look: str, cap: str) -> Run:
+def draw(patina: Path, cloud: Path, look: str, cap: str, detail: float = 0.0) -> Run:
     """The first picture's milliseconds; of the disk all that was read, opening and a second picture beside it too."""
     with tempfile.TemporaryDirectory() as folder, subprocess.Popen(
             [patina, "render", cloud, "-o", Path(folder) / "town.png", "--size", SIZE, "--look", look, "--device", "cpu",
-             "--memory", cap, "--repeat", "1", "--stats", "json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
+             "--memory", cap, "--detail", str(detail), "--repeat", "1", "--stats", "json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
         assert child.stdout and child.stderr
         out, said = child.stdout.read(), child.stderr.read()
         _, status, usage = os.wait4(child.pid, 0)
@@ -80,6 +82,26 @@ def rows_of(patina: Path, cloud: Path, across: int) -> list[str]:
     return rows
 
 
+def measure_levels(sizes: tuple[int, ...], library: Path, folder: Path | None = None) -> str:
+    patina, town = library.parent / "patina", library.parent / "tests/bench/town"
+    rows = ["| points | view | pixels between points | cold, ms | warm, ms | peak memory, MB | asked by passes over points, MB | of the file | read of the disk, MB |",
+            "|---|---|---|---|---|---|---|---|---|"]
+    for across in sizes:
+        with tempfile.TemporaryDirectory(dir=folder) as temporary:
+            cloud = Path(temporary) / "town.cloud"
+            subprocess.run([town, cloud, str(across), "1000000", str(LEVELS)], check=True, capture_output=True)
+            for view, look in looks(across).items():
+                for detail in DETAILS:
+                    forget(cloud)
+                    cold = draw(patina, cloud, look, CAPS[0], detail)
+                    warm = [draw(patina, cloud, look, CAPS[0], detail) for _ in range(ROUNDS)]
+                    read = cold.mapped["read"]
+                    rows.append(f"| {across**2},000,000 | {view} | {detail:.0f} | {cold.ms:.0f} | {statistics.median(run.ms for run in warm):.0f} | "
+                                f"{max(run.peak for run in (cold, *warm)):.0f} | {1e-6 * read:.1f} | {read / cloud.stat().st_size:.2%} | {cold.disk:.0f} |")
+                    print(rows[-1], file=sys.stderr)
+    return "\n".join(rows)
+
+
 def measure(sizes: tuple[int, ...], library: Path, folder: Path | None = None) -> str:
     patina, town = library.parent / "patina", library.parent / "tests/bench/town"
     rows = ["| points | view | cap | cold, ms | warm, ms | peak memory, MB | rounds | asked by passes over points, MB | read of the disk, MB | times |",
@@ -97,8 +119,9 @@ def main() -> None:
     parser.add_argument("--across", type=int, action="append")
     parser.add_argument("--folder", type=Path, help="where there is room on a disk")
     parser.add_argument("--library", type=Path, default=ROOT / "build/out/release/libpatina.so")
+    parser.add_argument("--levels", action="store_true")
     options = parser.parse_args()
-    print(measure(tuple(options.across or (3, 10)), options.library, options.folder))
+    print((measure_levels if options.levels else measure)(tuple(options.across or (3, 10)), options.library, options.folder))
 
 
 if __name__ == "__main__":
