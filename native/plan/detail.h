@@ -7,9 +7,9 @@
 
 // Of an instance; tolerance 0: all its chunks are drawn.
 struct pt_detail {
-    double tolerance;         // pixels
-    double finest, coarsest;  // gaps of its cloud, object units
-    double least;             // of what was drawn so far; 0: nothing
+    double tolerance;        // pixels
+    double finest, coarsest; // gaps of its cloud, object units
+    double least;            // of what was drawn so far; 0: nothing
 };
 
 void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance,

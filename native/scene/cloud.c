@@ -643,8 +643,8 @@ void pt_cloud_begin_info(struct patina_cloud *cloud, const patina_cloud_desc *de
     cloud->color_format = color_format(&desc->color);
 }
 
-int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, struct pt_pool *pool, struct patina_progress *progress,
-                   struct patina_cloud **out)
+int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, struct pt_pool *pool,
+                   struct patina_progress *progress, struct patina_cloud **out)
 {
     struct build build = {.kind = kind, .desc = *desc, .pool = pool, .progress = progress};
     int error = PATINA_ERROR_MEMORY;

@@ -167,8 +167,8 @@ void pt_read_vector(const patina_array *array, uint64_t index, double v[3]);
 enum pt_build_kind { PT_BUILD_FREELY, PT_BUILD_EVENLY, PT_BUILD_PART };
 int pt_cloud_check_desc(patina_cloud_desc *desc);
 void pt_cloud_begin_info(struct patina_cloud *cloud, const patina_cloud_desc *desc);
-int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, struct pt_pool *pool, struct patina_progress *progress,
-                   struct patina_cloud **out);
+int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, struct pt_pool *pool,
+                   struct patina_progress *progress, struct patina_cloud **out);
 int pt_cloud_tell(int error, uint64_t points);
 void pt_cloud_position(const patina_cloud_desc *desc, uint64_t index, double p[3]); // object units
 int pt_cloud_draws(const patina_cloud_desc *desc, uint64_t index, const double p[3]);

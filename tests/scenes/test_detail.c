@@ -31,7 +31,8 @@ static int remove_file(void **state)
     return remove(path);
 }
 
-static struct picture draw(patina_device *device, patina_scene *scene, float detail, uint32_t surface, patina_frame_stats *stats)
+static struct picture draw(patina_device *device, patina_scene *scene, float detail, uint32_t surface,
+                           patina_frame_stats *stats)
 {
     patina_frame *frame = NULL;
     patina_settings settings = settings_default(WIDTH, HEIGHT);
@@ -53,7 +54,8 @@ static patina_scene *look_at_town(patina_cloud *cloud, int near)
     const double far_eye[3] = {-0.4 * side, -0.75 * side, 0.75 * side}, middle[3] = {side / 2, side / 2, 4};
     const double near_eye[3] = {62, 46, 9}, street[3] = {74, 110, 6};
     patina_scene *scene = scene_of(cloud, NULL);
-    const patina_camera camera = camera_perspective(near ? near_eye : far_eye, near ? street : middle, 45, WIDTH, HEIGHT, 0.1, 1000);
+    const patina_camera camera = camera_perspective(near ? near_eye : far_eye, near ? street : middle, 45, WIDTH, HEIGHT, 0.1,
+                                                    1000);
     CHECK(patina_scene_set_camera(scene, &camera), scene);
     return scene;
 }
