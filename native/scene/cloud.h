@@ -76,7 +76,7 @@ struct patina_cloud {
     float *positions;       // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
     uint32_t *order;        // slots: index in the caller's arrays
     uint32_t *surface;      // slots: octahedral normal and spacing class (shared/words.h)
-    int beside;             // pt_shapes_beside
+    int beside;             // pt_shapes_beside; files keep it
     uint32_t *shapes;       // slots: footprint, thickness, kind (shared/words.h), or NULL where the cloud was not analysed
     void *colors;           // slots x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities;     // slots, or NULL where every point is opaque

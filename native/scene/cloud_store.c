@@ -25,6 +25,7 @@ struct header {
     double spacing_base, built;
     uint64_t class_hash;
     uint64_t sight_count, sight_room, sight_bytes; // of stations, and what they saw
+    uint64_t beside;                               // the cloud's
     patina_cloud_info info;
     uint64_t sums[SECTIONS]; // of what each section holds, see sum_of
     uint64_t check;          // of all before it, and of the chunks
@@ -139,6 +140,7 @@ static void fill_header(struct header *header, const struct patina_cloud *cloud)
     header->spacing_base = cloud->spacing_base;
     header->built = cloud->built;
     header->class_hash = cloud->class_hash;
+    header->beside = cloud->beside != 0;
     header->sight_count = cloud->sights.count;
     header->sight_room = cloud->sights.room;
     header->sight_bytes = cloud->sights.bytes;
@@ -300,9 +302,8 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
     cloud->info.bytes = sections[0].size;
     for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
         cloud->mapped |= (uint32_t)(sections[i].size > 0) << i;
-    code = check_cloud(path, cloud);
-    cloud->beside = !code && cloud->shapes && pt_shapes_beside(cloud);
-    return code;
+    cloud->beside = header.beside != 0;
+    return check_cloud(path, cloud);
 }
 
 // ---- verify ------------------------------------------------------------------------------------------------------------

@@ -73,15 +73,13 @@ void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct p
 
 int pt_shapes_beside(const struct patina_cloud *cloud)
 {
-    enum { LOOKED_AT = 512, HELD = 16 }; // chunks at least: a file need not be read for it, and what was read not be held
+    enum { LOOKED_AT = 512 }; // chunks at least
     const uint32_t step = cloud->chunk_count < 2 * LOOKED_AT ? 1 : cloud->chunk_count / LOOKED_AT;
     uint64_t asked = 0, found = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c += step) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t i = 0; i < chunk->padded; i += 16, asked++)
             found += (cloud->shapes[chunk->first + i] & PT_SHAPE_BESIDE) != 0;
-        if (cloud->mapped >> PT_ARRAY_SHAPES & 1u && c / step % HELD == HELD - 1)
-            pt_cloud_return(cloud);
     }
     return 100 * found > asked;
 }
