@@ -3,7 +3,7 @@
 
     python tests/bench/building.py [--points N] [--memory MB] [--folder FOLDER] [--library FILE]
 
-The Python needs numpy, laspy and lazrs (build/out/readers has them). Each step is a process of its own, so that its peak is its own."""
+The Python needs numpy, laspy and lazrs: that of build/out/venv, with the readers of build/out/readers on PYTHONPATH. Each step is a process of its own, so that its peak is its own."""
 
 from __future__ import annotations
 
