@@ -98,6 +98,7 @@ def test_scalars_and_classes():
     obj, = import_copc(path, 'ON')
     obj.patina.colors.source = 'SCALAR'
     obj.patina.colors.scalar = "intensity"
+    clouds.CACHE.clear()  # the one with the file's colours
     see([obj])
     render()
     cloud = stream_of().cloud
