@@ -30,7 +30,7 @@ from . import (
     world,
 )
 
-_MODULES = (addresses, analyze, balance, clips, colors, import_points, export_points, combine, farm, linked_points, plan, points, points_keys, points_tools, preferences,
+_MODULES = (analyze, balance, clips, colors, import_points, addresses, export_points, combine, farm, linked_points, plan, points, points_keys, points_tools, preferences,
             scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
 
 
