@@ -61,7 +61,7 @@ static inline vf vf_exp2(vf x)
 // 4 ulp(z) for z >= 0 (0 at 0): the exponent alone, times 2^-21.
 static inline vf vf_ulp4(vf z) { return vi_float(vi_and(vf_bits(z), vi_set(0x7F800000u))) * vf_set(0x1p-21f); }
 
-// The octahedral normals of surface words, not yet unit. Words without one give anything.
+// The octahedral normals of surfels, not yet unit. Words without one give anything.
 static inline void vf_decode_normal(vi word, vf n[3])
 {
     const vi mask = vi_set(0x1FFFu), middle = vi_set(4095u);
@@ -75,7 +75,7 @@ static inline void vf_decode_normal(vi word, vf n[3])
     n[2] = z;
 }
 
-// Normals of surface words in view space, not yet unit. Words without one give anything.
+// Normals of surfels in view space, not yet unit. Words without one give anything.
 static inline void vf_view_normal(const struct instance_args *instance, vi word, vf n[3])
 {
     const float *m = instance->normal_matrix;

@@ -56,19 +56,19 @@ static int run_ink(struct pt_gl_device *d, const struct pt_gl_work *work)
     return run_over(d, PT_KERNEL_ink, format, definitions[format], args->crop_width, args->crop_height);
 }
 
-static int run_surface(struct pt_gl_device *d, const struct pt_gl_work *work)
+static int run_resolve(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
-    const struct surface_args *args = work->arguments;
+    const struct resolve_args *args = work->arguments;
     const uint32_t normals = args->instance.has_normals != 0, sigmas = args->sigma_scale > 0.0f, span = args->with_span != 0;
     const uint32_t variant = normals + 2 * sigmas + 4 * span;
     char definitions[64];
     snprintf(definitions, sizeof definitions, "#define NORMALS %u\n#define SIGMAS %u\n#define SPAN %u\n", normals, sigmas,
              span);
-    int result = pt_gl_kernel_program(d, PT_KERNEL_surface, variant, definitions);
+    int result = pt_gl_kernel_program(d, PT_KERNEL_resolve, variant, definitions);
     if (result != PATINA_OK)
         return result;
-    d->gl.ProgramUniform1fv(d->programs[PT_KERNEL_surface][variant], 16, PT_SPACINGS, args->instance.spacing);
-    return pt_gl_dispatch_tiles(d, PT_KERNEL_surface, variant, PT_GL_TILES_POINTS);
+    d->gl.ProgramUniform1fv(d->programs[PT_KERNEL_resolve][variant], 16, PT_SPACINGS, args->instance.spacing);
+    return pt_gl_dispatch_tiles(d, PT_KERNEL_resolve, variant, PT_GL_TILES_POINTS);
 }
 
 // Every pixel is gathered before any is blurred.
@@ -101,11 +101,11 @@ static int run_peel(struct pt_gl_device *d, const struct pt_gl_work *work)
 // Pointwise kernels are pointwise.c's; the others have one dispatch, over their domain: tiles with points in them, or the rectangle.
 static pt_gl_runner *const runners[PT_KERNEL_COUNT] = {
     [PT_KERNEL_sift] = pt_gl_points,   [PT_KERNEL_scatter] = pt_gl_scatter,
-    [PT_KERNEL_splat] = pt_gl_splat,   [PT_KERNEL_surface] = run_surface,
+    [PT_KERNEL_splat] = pt_gl_splat,   [PT_KERNEL_resolve] = run_resolve,
     [PT_KERNEL_blend] = pt_gl_blend,   [PT_KERNEL_center] = pt_gl_points,
     [PT_KERNEL_pull] = run_pull,       [PT_KERNEL_fill] = pt_gl_fill,
     [PT_KERNEL_push] = pt_gl_push,     [PT_KERNEL_average] = pt_gl_average,
-    [PT_KERNEL_raster] = pt_gl_raster, [PT_KERNEL_lit] = pt_gl_points,
+    [PT_KERNEL_raster] = pt_gl_raster, [PT_KERNEL_shadow_test] = pt_gl_points,
     [PT_KERNEL_lines] = pt_gl_lines,   [PT_KERNEL_shade] = pt_gl_shade,
     [PT_KERNEL_obscure] = run_obscure, [PT_KERNEL_antialias] = pt_gl_antialias,
     [PT_KERNEL_peel] = run_peel,       [PT_KERNEL_focus] = run_focus,

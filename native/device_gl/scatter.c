@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of the kernels that walk points, in batches where a cloud is larger than a storage block. scatter: two 32-bit
-// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend, average, merge, differ: a pass a band of rows; lit, sift,
+// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend, average, merge, differ: a pass a band of rows; shadow_test, sift,
 // center, average: one instance.
 #include "device_gl.h"
 #include "shared/measured.h"

@@ -30,7 +30,7 @@ void pt_plan_average(struct pt_builder *builder)
         const struct pt_ref refs[] = {pt_keys_of(builder, 0),          pt_from_of(builder, 0),
                                       pt_plane_at(PT_PLANE_DEFF, 0),   pt_plane_at(PT_PLANE_NORMAL, 0),
                                       pt_plane_at(PT_PLANE_ALBEDO, 0), pt_buffer_of(PT_CHUNKS, i),
-                                      pt_buffer_of(PT_POSITIONS, i),   pt_buffer_of(PT_SURFACE, i),
+                                      pt_buffer_of(PT_POSITIONS, i),   pt_buffer_of(PT_SURFELS, i),
                                       pt_buffer_of(PT_COLORS, i),      args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()};
         PT_REASON(pt_add(builder, PT_KERNEL_average, "average", &args, sizeof args, refs, sizeof refs / sizeof *refs),
                   "colour%s of instance %u: means over the points about its surface", args.normals ? " and normals" : "", i);

@@ -11,7 +11,7 @@ const struct pt_plane_row pt_plane_rows[PT_PLANE_COUNT] = {
 };
 
 static const uint8_t instance_formats[] = {
-    [PT_CHUNKS] = PT_FORMAT_chunk,      [PT_POSITIONS] = PT_FORMAT_position, [PT_SURFACE] = PT_FORMAT_word,
+    [PT_CHUNKS] = PT_FORMAT_chunk,      [PT_POSITIONS] = PT_FORMAT_position, [PT_SURFELS] = PT_FORMAT_word,
     [PT_COLORS] = PT_FORMAT_color,      [PT_OPACITIES] = PT_FORMAT_opacity,  [PT_RADII] = PT_FORMAT_radius,
     [PT_SCALARS] = PT_FORMAT_scalar,    [PT_CLASSES] = PT_FORMAT_class,      [PT_SHAPES] = PT_FORMAT_shape,
     [PT_SIGHTS] = PT_FORMAT_sight,      [PT_MARKS] = PT_FORMAT_mark,         [PT_SHADOWS] = PT_FORMAT_shadow,

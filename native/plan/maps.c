@@ -90,7 +90,7 @@ struct tests {
     const struct pt_round *round;
     struct pt_ref planes[3]; // keys, from, deff
     struct pt_ref opacities;
-    struct lit_args args;
+    struct shadow_test_args args;
 };
 
 static void say_who(struct pt_pass *pass, uint32_t instance)
@@ -102,20 +102,20 @@ static void say_who(struct pt_pass *pass, uint32_t instance)
 }
 
 // Behind soft points: with what the surfaces' tests are asked.
-static void add_dim(struct tests *tests, uint32_t instance, const struct lit_args *lit, struct pt_ref positions)
+static void add_dim(struct tests *tests, uint32_t instance, const struct shadow_test_args *asked, struct pt_ref positions)
 {
     struct pt_plan *map = tests->builder.plan;
-    struct dim_args args = {.view = lit->view,
-                            .base = lit->base,
-                            .alone = lit->alone,
-                            .close = lit->close,
-                            .samples = lit->samples,
-                            .compare = lit->compare,
-                            .marked = lit->marked,
+    struct dim_args args = {.view = asked->view,
+                            .base = asked->base,
+                            .alone = asked->alone,
+                            .close = asked->close,
+                            .samples = asked->samples,
+                            .compare = asked->compare,
+                            .marked = asked->marked,
                             .veils = map->veils,
                             .veil_from = map->soft_depths[0],
                             .veil_scale = 1.0f / pt_veil_deep(map)};
-    memcpy(args.window, lit->window, sizeof args.window);
+    memcpy(args.window, asked->window, sizeof args.window);
     const struct pt_ref refs[] = {pt_plane_at(PT_PLANE_VEIL, 0),
                                   {PT_OF_RECEIVER, PT_CHUNKS, map->receiver_count},
                                   positions,
@@ -123,16 +123,17 @@ static void add_dim(struct tests *tests, uint32_t instance, const struct lit_arg
                                   pt_buffer_of(PT_SHADOWS, instance),
                                   {PT_OF_FLAG, PT_FLAG_DIFFERS, 0}};
     map->receiver_count++;
-    struct pt_pass *pass = pt_add(&tests->builder, PT_KERNEL_dim, "lit", &args, sizeof args, refs, sizeof refs / sizeof *refs);
+    struct pt_pass *pass = pt_add(&tests->builder, PT_KERNEL_dim, "shadows", &args, sizeof args, refs,
+                                  sizeof refs / sizeof *refs);
     say_who(pass, instance);
 }
 
-static int add_lit(struct tests *tests, uint32_t instance, const struct pt_instance *receiver, struct pt_ref positions,
-                   struct pt_ref words)
+static int add_test(struct tests *tests, uint32_t instance, const struct pt_instance *receiver, struct pt_ref positions,
+                    struct pt_ref words)
 {
     struct pt_plan *map = tests->builder.plan;
     struct pt_receiver *out = &map->receivers[map->receiver_count];
-    struct lit_args args = tests->args;
+    struct shadow_test_args args = tests->args;
     int error = pt_plan_chunks(tests->view, map, receiver, &args.instance, &out->chunks);
     if (error)
         return error;
@@ -160,7 +161,8 @@ static int add_lit(struct tests *tests, uint32_t instance, const struct pt_insta
                                   {PT_OF_FLAG, PT_FLAG_DIFFERS, 0},
                                   tests->opacities};
     map->receiver_count++;
-    struct pt_pass *pass = pt_add(&tests->builder, PT_KERNEL_lit, "lit", &args, sizeof args, refs, sizeof refs / sizeof *refs);
+    struct pt_pass *pass = pt_add(&tests->builder, PT_KERNEL_shadow_test, "shadows", &args, sizeof args, refs,
+                                  sizeof refs / sizeof *refs);
     say_who(pass, instance);
     return PATINA_OK;
 }
@@ -179,16 +181,16 @@ static int add_tests(struct tests *tests, int close)
         const uint32_t which = i < scene->instance_count ? i : PT_PIXELS;
         const uint32_t maps = maps_of(scene, tests->picture, tests->round, which);
         const struct pt_ref positions = {PT_OF_RECEIVER, PT_POSITIONS, map->receiver_count};
-        const struct pt_ref words = {PT_OF_RECEIVER, PT_SURFACE, map->receiver_count};
+        const struct pt_ref words = {PT_OF_RECEIVER, PT_SURFELS, map->receiver_count};
         struct pt_instance instance;
         if (close ? maps < 2 : !receives(scene, tests->picture, tests->round, tests->round->group, which))
             continue;
         tests->args.alone = !close && maps == 1;
         if (which != PT_PIXELS)
-            error = add_lit(tests, i, &scene->instances[i], positions, words);
+            error = add_test(tests, i, &scene->instances[i], positions, words);
         else if (!(error = pixels_as_cloud(scene, tests->picture, map, pixels, &instance)))
-            error = add_lit(tests, PT_PIXELS, &instance, (struct pt_ref){PT_OF_PICTURE, PT_PLANE_MESH_PLACES, 0},
-                            (struct pt_ref){PT_OF_PICTURE, PT_PLANE_MESH_WORDS, 0});
+            error = add_test(tests, PT_PIXELS, &instance, (struct pt_ref){PT_OF_PICTURE, PT_PLANE_MESH_PLACES, 0},
+                             (struct pt_ref){PT_OF_PICTURE, PT_PLANE_MESH_WORDS, 0});
     }
     return error ? error : tests->builder.failed;
 }
@@ -196,7 +198,7 @@ static int add_tests(struct tests *tests, int close)
 static struct tests begin_tests(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
                                 struct pt_plan *map)
 {
-    return (struct tests){.builder = {.scene = scene, .plan = map, .as = "lit"},
+    return (struct tests){.builder = {.scene = scene, .plan = map, .as = "shadows"},
                           .scene = scene,
                           .picture = picture,
                           .round = round,

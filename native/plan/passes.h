@@ -160,7 +160,7 @@ enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words); /
 void pt_plan_splat(struct pt_builder *builder);
 int pt_tells_surfaces(const struct pt_builder *builder); // the depth asked for is that of the surface
 int pt_tells_depths(const struct pt_builder *builder);   // and discs, in the mean, tell how far off it is
-void pt_plan_blend(struct pt_builder *builder);          // after pt_plan_surface of every instance
+void pt_plan_blend(struct pt_builder *builder);          // after pt_plan_resolve of every instance
 int pt_blends_light(const struct pt_builder *builder);   // light arrives at all discs of a pixel: at the mean of their words
 void pt_plan_blend_marks(struct pt_builder *builder);    // in place of mark
 void pt_plan_blend_light(struct pt_builder *builder);    // once shadow words are known
@@ -208,7 +208,7 @@ void pt_plan_reopen_take(struct pt_builder *builder);                      // af
 void pt_plan_reopen_show(struct pt_builder *builder, enum pt_plane color); // after shading
 
 // plan.c: normal and layer distance of an instance's pixels.
-void pt_plan_surface(struct pt_builder *builder, uint32_t instance);
+void pt_plan_resolve(struct pt_builder *builder, uint32_t instance);
 
 // ---- views -------------------------------------------------------------------------------------------------------------
 

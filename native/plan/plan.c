@@ -42,7 +42,7 @@ static void plan_scatter(struct pt_builder *builder)
             continue;
         refs[count++] = pt_buffer_of(PT_CHUNKS, i);
         refs[count++] = pt_buffer_of(PT_POSITIONS, i);
-        refs[count++] = pt_buffer_of(PT_SURFACE, i);
+        refs[count++] = pt_buffer_of(PT_SURFELS, i);
         args.instances++;
         chunks += plan->instances[i].chunk_count;
         points += plan->instances[i].points;
@@ -63,7 +63,7 @@ static void plan_scatter(struct pt_builder *builder)
 #define DISC_PIXELS 1.5f
 #define DISC_RADII 2.3f // classes of spacings are 1.19 wide: others' discs may be as much wider
 
-static void join_discs(const struct pt_plan_instance *instance, struct surface_args *args)
+static void join_discs(const struct pt_plan_instance *instance, struct resolve_args *args)
 {
     args->view.footprint *= DISC_PIXELS;
     if (args->instance.has_normals)
@@ -73,7 +73,7 @@ static void join_discs(const struct pt_plan_instance *instance, struct surface_a
         args->instance.spacing[k] *= DISC_RADII * PT_DISC_SPACINGS / PT_SPACING_FACTOR;
 }
 
-void pt_plan_surface(struct pt_builder *builder, uint32_t i)
+void pt_plan_resolve(struct pt_builder *builder, uint32_t i)
 {
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
@@ -83,19 +83,19 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
         args.radius = wanted < ESTIMATE_LEAST ? ESTIMATE_LEAST : wanted > ESTIMATE_MOST ? ESTIMATE_MOST : (uint32_t)wanted;
         args.steep = !builder->layer;
         PT_REASON(PT_ADD(builder, normals, args,
-                         {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0)}),
+                         {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFELS, i), pt_plane_at(PT_PLANE_NORMAL, 0)}),
                   "instance %u has no normals: estimated from the depth of at most %u x %u pixels", i, 2 * args.radius + 1,
                   2 * args.radius + 1);
     }
     const int thick = pt_has_sigmas(plan, instance);
-    struct surface_args args = {.view = pt_view_of(plan, instance, 0),
+    struct resolve_args args = {.view = pt_view_of(plan, instance, 0),
                                 .instance = instance->args,
                                 .sigma_scale = thick ? pt_sigma_scale(instance) : 0.0f,
                                 .with_span = plan->sigmas != 0};
     if (instance->discs && plan->layers > 1)
         join_discs(instance, &args);
-    PT_REASON(PT_ADD(builder, surface, args,
-                     {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0),
+    PT_REASON(PT_ADD(builder, resolve, args,
+                     {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFELS, i), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0), thick ? pt_shapes_of(instance, i) : pt_nothing(),
                       pt_plane_if(plan->sigmas, PT_PLANE_SPAN, 0)}),
               "layer distance%s and normal of instance %u's pixels", thick ? " by sigma" : "", i);
@@ -331,7 +331,7 @@ static void plan_marks(struct pt_builder *builder)
                 : builder->scene->settings.shadow_lazy ? "the error target is measured on whole shadow textures"
                                                        : "whole shadow textures, to be kept");
     if (none)
-        pt_skip(builder, "lit", none);
+        pt_skip(builder, "shadow_test", none);
     if (none || !pt_casts_in_layers(builder->scene))
         pt_skip(builder, "limit", none ? none : "the points of no cloud that casts have opacities of their own");
     if (none || !pt_soft_casts(builder->scene))
@@ -415,7 +415,7 @@ static void plan_measured(struct pt_builder *builder)
     pt_plan_ranges(builder);
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count && !plan->instances[i].range) {
-            pt_plan_surface(builder, i);
+            pt_plan_resolve(builder, i);
             if (builder->layer == 1 && pt_tells_surfaces(builder) && !plan->instances[i].discs)
                 plan_center(builder, i);
             estimate |= !plan->instances[i].args.has_normals;
@@ -427,7 +427,7 @@ static void plan_measured(struct pt_builder *builder)
         pt_skip(builder, "normals",
                 points || discs ? "every cloud in view has normals" : "range images have those of their cells");
     if (!points && !discs)
-        pt_skip(builder, "surface", "range images tell normals and layer distances themselves");
+        pt_skip(builder, "resolve", "range images tell normals and layer distances themselves");
     if (discs)
         pt_plan_blend(builder);
 }

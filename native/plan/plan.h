@@ -133,7 +133,7 @@ _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_S
 enum pt_instance_buffer {
     PT_CHUNKS,
     PT_POSITIONS,
-    PT_SURFACE,
+    PT_SURFELS,
     PT_COLORS,
     PT_OPACITIES,
     PT_RADII,

@@ -139,7 +139,7 @@ static void add_cells(struct pt_builder *builder, uint32_t i, const struct pt_ra
     const struct scatter_args scatter = {
         .view = range->cells, .instances = 1, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
     PT_REASON(PT_ADD(builder, scatter, scatter,
-                     {keys, beyond, drawn, chunks, pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i)}),
+                     {keys, beyond, drawn, chunks, pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFELS, i)}),
               "%llu points in %u chunks of instance %u, into cells", (unsigned long long)instance->points,
               instance->chunk_count, i);
     const struct merge_args merge = {.view = range->cells,
@@ -149,7 +149,7 @@ static void add_cells(struct pt_builder *builder, uint32_t i, const struct pt_ra
                                      .sifted = plan->drawn_words > 0};
     PT_REASON(PT_ADD(builder, merge, merge,
                      {keys, pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_MERGED, 0), chunks,
-                      pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i), pt_buffer_of(PT_COLORS, i),
+                      pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFELS, i), pt_buffer_of(PT_COLORS, i),
                       pt_buffer_of(PT_OPACITIES, i), drawn}),
               "means of points up to gamma %.3g behind the nearest", (double)range->gamma);
 }
@@ -174,7 +174,7 @@ static void add_differences(struct pt_builder *builder, uint32_t i, const struct
         PT_REASON(
             PT_ADD(builder, differ, args,
                    {pt_plane_at(PT_PLANE_CELLS, 0), pt_plane_at(PT_PLANE_CELL_INCLINED, 0), pt_plane_at(PT_PLANE_CELL_LEAST, 0),
-                    pt_plane_at(PT_PLANE_CELL_MOST, 0), chunks, pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i),
+                    pt_plane_at(PT_PLANE_CELL_MOST, 0), chunks, pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFELS, i),
                     pt_buffer_of(PT_SCANS, i), plan->drawn_words ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()}),
             "how far scans of instance %u lie apart: %u to %u", i, args.first, args.first + PT_DIFFER_SCANS - 1);
 }

@@ -6,7 +6,7 @@ int pt_pass_divides(const struct pt_pass *pass)
     switch (pass->kernel) {
     case PT_KERNEL_scatter: // least keys
     case PT_KERNEL_sift:    // bits, words and records of the chunks themselves
-    case PT_KERNEL_lit:
+    case PT_KERNEL_shadow_test:
     case PT_KERNEL_dim:
     case PT_KERNEL_gather: return 1;
     default: return 0; // sums that end in a mean, or bins that the next pass takes up
@@ -17,7 +17,7 @@ static uint32_t array_bit(enum pt_instance_buffer which, const struct patina_clo
 {
     switch (which) {
     case PT_POSITIONS: return 1u << PT_ARRAY_POSITIONS;
-    case PT_SURFACE: return 1u << PT_ARRAY_SURFACE;
+    case PT_SURFELS: return 1u << PT_ARRAY_SURFELS;
     case PT_COLORS: return 1u << PT_ARRAY_COLORS;
     case PT_OPACITIES: return 1u << PT_ARRAY_OPACITIES;
     case PT_RADII: return 1u << (cloud->radii ? PT_ARRAY_RADII : PT_ARRAY_SHAPES);
@@ -46,7 +46,7 @@ uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, s
                                        .count = own ? plan->instances[ref->index].chunk_count
                                                     : plan->receivers[ref->index].chunk_count,
                                        .ref = k,
-                                       .culled = pass->kernel == PT_KERNEL_scatter ? 1u << PT_ARRAY_SURFACE : 0};
+                                       .culled = pass->kernel == PT_KERNEL_scatter ? 1u << PT_ARRAY_SURFELS : 0};
         for (uint32_t i = 0; i < pass->ref_count; i++)
             if (pass->refs[i].of == ref->of && pass->refs[i].index == ref->index)
                 list->arrays |= array_bit((enum pt_instance_buffer)pass->refs[i].which, cloud);

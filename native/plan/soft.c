@@ -332,7 +332,7 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
     struct pt_pass *pass = PT_ADD(
         builder, gather, args,
         {pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
-         pt_buffer_of(PT_SURFACE, i), pt_field_of(instance, i), pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i),
+         pt_buffer_of(PT_SURFELS, i), pt_field_of(instance, i), pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i),
          late ? pt_buffer_of(PT_SHADOWS, instance->of) : pt_nothing(), args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()});
     pass->late = late;
     PT_REASON(pass, "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,

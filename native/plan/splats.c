@@ -35,7 +35,7 @@ int pt_blends_light(const struct pt_builder *builder)
 // Binds what both kernels read of an instance; `blend`, if there is one, reads colours too, or marks or shadows.
 static uint32_t bind_instance(struct pt_ref *refs, const struct pt_plan *plan, uint32_t i, const struct blend_args *blend)
 {
-    static const enum pt_instance_buffer list[] = {PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_RADII, PT_COLORS, PT_OPACITIES};
+    static const enum pt_instance_buffer list[] = {PT_CHUNKS, PT_POSITIONS, PT_SURFELS, PT_RADII, PT_COLORS, PT_OPACITIES};
     const uint32_t count = blend ? 6 : 4, of = plan->instances[i].of;
     for (uint32_t k = 0; k < count; k++)
         refs[k] = pt_buffer_of(list[k], i);

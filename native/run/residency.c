@@ -35,12 +35,12 @@ static void forget_dead(struct pt_residency *residency, struct patina_device *de
 static int upload_shapes(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
     const void *radii = cloud->radii ? (const void *)cloud->radii : cloud->shapes;
-    device->ops->buffer_destroy(device, &resident->buffers[PT_SURFACE]);
+    device->ops->buffer_destroy(device, &resident->buffers[PT_SURFELS]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_RADII]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_SHAPES]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_SIGHTS]);
     resident->shapes = atomic_load(&cloud->alive->shapes);
-    int error = device->ops->buffer_create(device, cloud->slots * 4, cloud->surface, 1, &resident->buffers[PT_SURFACE]);
+    int error = device->ops->buffer_create(device, cloud->slots * 4, cloud->surfels, 1, &resident->buffers[PT_SURFELS]);
     if (!error && cloud->radii && cloud->shapes)
         error = device->ops->buffer_create(device, cloud->slots * 4, cloud->shapes, 1, &resident->buffers[PT_SHAPES]);
     if (error || !radii)

@@ -211,7 +211,7 @@ static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, 
 {
     const struct pt_chunk *chunk = &walk->cloud->chunks[chunk_index];
     struct tally *tally = &walk->tallies[chunk_index];
-    const uint32_t given = walk->given ? walk->cloud->surface[slot] & PT_NORMAL_BITS : PT_NORMAL_NONE;
+    const uint32_t given = walk->given ? walk->cloud->surfels[slot] & PT_NORMAL_BITS : PT_NORMAL_NONE;
     uint32_t bits = given;
     double p[3];
     const struct pt_beam *beam = beam_of(walk, chunk, slot, p);
@@ -222,13 +222,13 @@ static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, 
         bits = pt_encode_normal(hood->normal);
     }
     const double spacing = hood->spacing > 0.0 ? hood->spacing : (double)chunk->spacing;
-    walk->out->surface[slot] = bits | pt_class_of_spacing(spacing, walk->out->spacing_base) << PT_SPACING_SHIFT;
+    walk->out->surfels[slot] = bits | pt_class_of_spacing(spacing, walk->out->spacing_base) << PT_SPACING_SHIFT;
     walk->out->shapes[slot] = pt_pack_shape(hood, bits, walk->out->spacing_base);
 }
 
 static void finish_chunk(struct walk *walk, struct pt_chunk *chunk, float *spacings, uint32_t known)
 {
-    uint32_t *surface = walk->out->surface + chunk->first, *shapes = walk->out->shapes + chunk->first;
+    uint32_t *surfels = walk->out->surfels + chunk->first, *shapes = walk->out->shapes + chunk->first;
     uint32_t histogram[64] = {0}, most = 0, below = 0, at = 0;
     for (uint32_t i = 0; i < chunk->count; i++) {
         histogram[shapes[i] & 63u]++;
@@ -241,7 +241,7 @@ static void finish_chunk(struct walk *walk, struct pt_chunk *chunk, float *spaci
     qsort(spacings, known, sizeof *spacings, pt_compare_floats);
     chunk->spacing = known ? spacings[known / 2] : chunk->spacing;
     for (uint32_t i = chunk->count; i < chunk->padded; i++) {
-        surface[i] = surface[chunk->count - 1];
+        surfels[i] = surfels[chunk->count - 1];
         shapes[i] = shapes[chunk->count - 1];
     }
 }
@@ -367,9 +367,9 @@ static int vote_sides(struct walk *walk, struct pt_pool *pool)
     if (walk->given && !told)
         return PATINA_ERROR_MEMORY;
     for (uint32_t slot = 0; told && slot < cloud->slots; slot++)
-        told[slot / 32] |= (uint32_t)((cloud->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE) << slot % 32;
+        told[slot / 32] |= (uint32_t)((cloud->surfels[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE) << slot % 32;
     walk->out->oriented = PATINA_SIDES_VOTED;
-    const int error = pt_orient(&walk->tree, walk->out->chunks, told, walk->out->surface, walk->out->shapes, pool,
+    const int error = pt_orient(&walk->tree, walk->out->chunks, told, walk->out->surfels, walk->out->shapes, pool,
                                 walk->progress, 0.85, 1.0);
     pt_pages_free(told, size);
     return error;
@@ -381,9 +381,9 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     struct pt_analysis *out = walk->out;
     walk->tallies = calloc(cloud->chunk_count + 1, sizeof *walk->tallies);
     out->chunks = malloc((cloud->chunk_count + 1) * sizeof *out->chunks);
-    out->surface = pt_pages_alloc(out->slots * 4);
+    out->surfels = pt_pages_alloc(out->slots * 4);
     out->shapes = pt_pages_alloc(out->slots * 4);
-    if (!walk->tallies || !out->chunks || !out->surface || !out->shapes)
+    if (!walk->tallies || !out->chunks || !out->surfels || !out->shapes)
         return PATINA_ERROR_MEMORY;
     if (cloud->chunk_count)
         memcpy(out->chunks, cloud->chunks, cloud->chunk_count * sizeof *out->chunks);
@@ -417,7 +417,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
         gather_shapes(&out->chunks[c], out->shapes + out->chunks[c].first);
         out->chunks[c].cone_cosine = -2.0f;
         if (out->oriented)
-            pt_chunk_cone(&out->chunks[c], out->surface + out->chunks[c].first);
+            pt_chunk_cone(&out->chunks[c], out->surfels + out->chunks[c].first);
     }
     pt_progress_set(walk->progress, 1.0);
     return PATINA_OK;
@@ -455,7 +455,7 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
 
 void pt_analysis_free(struct pt_analysis *analysis)
 {
-    pt_pages_free(analysis->surface, analysis->slots * 4);
+    pt_pages_free(analysis->surfels, analysis->slots * 4);
     pt_pages_free(analysis->shapes, analysis->slots * 4);
     free(analysis->chunks);
     pt_sights_free(&analysis->sights);
@@ -483,14 +483,14 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     for (int kind = 0; kind < 6; kind++)
         cloud->info.kinds[kind] = analysis->kinds[kind];
     cloud->info.seen_through = analysis->seen_through;
-    pt_pages_free(cloud->surface, cloud->slots * 4);
+    pt_pages_free(cloud->surfels, cloud->slots * 4);
     pt_pages_free(cloud->shapes, cloud->slots * 4);
     pt_sights_free(&cloud->sights);
     free(cloud->chunks);
     cloud->sights = analysis->sights;
-    cloud->surface = analysis->surface;
+    cloud->surfels = analysis->surfels;
     cloud->shapes = analysis->shapes;
-    cloud->mapped &= ~(1u << PT_ARRAY_SURFACE | 1u << PT_ARRAY_SHAPES);
+    cloud->mapped &= ~(1u << PT_ARRAY_SURFELS | 1u << PT_ARRAY_SHAPES);
     cloud->chunks = analysis->chunks;
     cloud->beside = pt_shapes_beside(cloud);
     cloud->spacing_base = analysis->spacing_base;

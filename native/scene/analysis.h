@@ -8,7 +8,7 @@
 #include "sights.h"
 
 struct pt_analysis {
-    uint32_t *surface, *shapes; // slots
+    uint32_t *surfels, *shapes; // slots
     struct pt_chunk *chunks;
     uint64_t slots;
     double spacing_base;

@@ -22,7 +22,7 @@ struct reading {
 
 static uint32_t normal_of(const patina_cloud *cloud, uint32_t slot, double n[3])
 {
-    const uint32_t bits = cloud->surface[slot] & PT_NORMAL_BITS;
+    const uint32_t bits = cloud->surfels[slot] & PT_NORMAL_BITS;
     n[0] = n[1] = n[2] = 0.0;
     if (bits != PT_NORMAL_NONE)
         pt_decode_normal(bits, n);
@@ -48,7 +48,7 @@ static void read_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
             for (size_t k = 0; k < 3 && to->axis; k++)
                 to->axis[3 * at + k] = (float)hood.axis[k];
             if (to->spacing)
-                to->spacing[at] = (float)(cloud->spacing_base * pt_spacing_of_class(cloud->surface[slot] >> PT_SPACING_SHIFT));
+                to->spacing[at] = (float)(cloud->spacing_base * pt_spacing_of_class(cloud->surfels[slot] >> PT_SPACING_SHIFT));
             if (to->half_axes) {
                 to->half_axes[2 * at] = (float)hood.major;
                 to->half_axes[2 * at + 1] = (float)hood.minor;

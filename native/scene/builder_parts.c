@@ -172,7 +172,7 @@ static int keep_part(struct finish *finish, struct patina_cloud *part, const cha
     finish->cloud.color_format = part->color_format;
     if (tape_of(finish, PT_ARRAY_POSITIONS, part->positions, slots * 12) ||
         tape_of(finish, PT_ARRAY_ORDER, part->order, slots * 4) ||
-        tape_of(finish, PT_ARRAY_SURFACE, part->surface, slots * 4) ||
+        tape_of(finish, PT_ARRAY_SURFELS, part->surfels, slots * 4) ||
         tape_of(finish, PT_ARRAY_COLORS, part->colors, slots * pt_color_size(part->color_format)) ||
         tape_of(finish, PT_ARRAY_OPACITIES, part->opacities, slots) ||
         tape_of(finish, PT_ARRAY_RADII, part->radii, slots * 4) ||
@@ -334,14 +334,14 @@ static int make_levels(struct finish *finish)
 // ---- the file ----------------------------------------------------------------------------------------------------------------
 
 // Of slots first to first + count the class of their chunks' spacing.
-static void add_classes(const struct patina_cloud *cloud, uint32_t *surface, uint64_t first, uint64_t count, uint32_t *chunk)
+static void add_classes(const struct patina_cloud *cloud, uint32_t *surfels, uint64_t first, uint64_t count, uint32_t *chunk)
 {
     for (uint64_t i = 0; i < count;) {
         const struct pt_chunk *at = &cloud->chunks[*chunk];
         const uint64_t end = at->first + (uint64_t)at->padded - first;
         const uint32_t word = pt_class_of_spacing((double)at->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
         for (; i < end && i < count; i++)
-            surface[i] |= word;
+            surfels[i] |= word;
         *chunk += i == end;
     }
 }
@@ -359,7 +359,7 @@ static int write_tape(struct finish *finish, struct pt_cloud_writer *writer, enu
             return pt_builder_fail(builder, error);
         if (pt_progress_cancelled(finish->progress))
             return PATINA_ERROR_CANCELLED;
-        if (array == PT_ARRAY_SURFACE)
+        if (array == PT_ARRAY_SURFELS)
             add_classes(&finish->cloud, (uint32_t *)(void *)buffer, done / 4, some / 4, &chunk);
         pt_cloud_writer_add(writer, array, buffer, some);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Building a cloud: box -> Morton order -> chunks (strata, boxes, spacing) -> surface words and cones -> colours.
+// Building a cloud: box -> Morton order -> chunks (strata, boxes, spacing) -> surfels and cones -> colours.
 #include "cloud.h"
 #include "base/color.h"
 #include "base/descriptor.h"
@@ -364,13 +364,13 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 // ---- normals -------------------------------------------------------------------------------------------------------
 
-// Rounds every valid normal of the chunk's points into surface words; the cone is that of the rounded normals.
-static void surface_chunk(struct build *build, uint32_t index)
+// Rounds every valid normal of the chunk's points into surfels; the cone is that of the rounded normals.
+static void surfel_chunk(struct build *build, uint32_t index)
 {
     struct patina_cloud *cloud = build->cloud;
     struct pt_chunk *chunk = &cloud->chunks[index];
     const uint32_t *order = cloud->order + chunk->first;
-    uint32_t *surface = cloud->surface + chunk->first;
+    uint32_t *surfels = cloud->surfels + chunk->first;
     uint32_t class = pt_class_of_spacing((double)chunk->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
     double n[3];
     for (uint32_t i = 0; i < chunk->count; i++) {
@@ -379,19 +379,19 @@ static void surface_chunk(struct build *build, uint32_t index)
             bits = pt_encode_normal(n);
         else
             build->tallies[index].invalid_normals++;
-        surface[i] = bits | class;
+        surfels[i] = bits | class;
     }
     for (uint32_t i = chunk->count; i < chunk->padded; i++)
-        surface[i] = surface[chunk->count - 1];
-    pt_chunk_cone(chunk, surface);
+        surfels[i] = surfels[chunk->count - 1];
+    pt_chunk_cone(chunk, surfels);
 }
 
-static void surface_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+static void surfel_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct build *build = context;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++)
-        surface_chunk(build, c);
+        surfel_chunk(build, c);
 }
 
 // ---- other attributes ----------------------------------------------------------------------------------------------------
@@ -540,11 +540,11 @@ static int allocate(struct build *build)
     build->tallies = calloc(cloud->chunk_count + 1, sizeof *build->tallies);
     cloud->positions = pt_pages_alloc(cloud->slots * 12);
     cloud->order = pt_pages_alloc(cloud->slots * 4);
-    cloud->surface = pt_pages_alloc(cloud->slots * 4);
+    cloud->surfels = pt_pages_alloc(cloud->slots * 4);
     cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
     cloud->opacities = cloud->info.has_opacities ? pt_pages_alloc(opacity_bytes(cloud)) : NULL;
     cloud->radii = cloud->info.has_radii ? pt_pages_alloc(cloud->slots * 4) : NULL;
-    if (!build->tallies || !cloud->positions || !cloud->order || !cloud->surface || (cloud->color_format && !cloud->colors) ||
+    if (!build->tallies || !cloud->positions || !cloud->order || !cloud->surfels || (cloud->color_format && !cloud->colors) ||
         (cloud->info.has_opacities && !cloud->opacities) || (cloud->info.has_radii && !cloud->radii))
         return PATINA_ERROR_MEMORY;
     cloud->info.bytes = cloud->slots * (cloud->radii ? 24 : 20) + (cloud->colors ? color_bytes(cloud) : 0) +
@@ -575,7 +575,7 @@ static int build_cloud(struct build *build)
     pt_parallel(build->pool, cloud->chunk_count, 1, fill_chunks, build);
     if (build->kind != PT_BUILD_PART && (error = pt_cloud_settle_built(cloud)))
         return error;
-    pt_parallel(build->pool, cloud->chunk_count, 1, surface_chunks, build);
+    pt_parallel(build->pool, cloud->chunk_count, 1, surfel_chunks, build);
     pt_progress_set(build->progress, 0.9);
     pt_parallel(build->pool, cloud->chunk_count, 1, attribute_chunks, build);
     if (pt_progress_cancelled(build->progress))

@@ -36,7 +36,7 @@ struct pt_alive {
     atomic_int references, alive;
     atomic_uint colors;           // counts how often they and the scalars were set
     atomic_uint pages;            // counts how often pages arrived: all arrays are others then
-    atomic_uint shapes;           // counts how often surface words and shapes were
+    atomic_uint shapes;           // counts how often surfels and shapes were
     _Atomic uint64_t fingerprint; // 0: nobody has asked for it yet
 };
 
@@ -52,7 +52,7 @@ enum pt_array {
     PT_ARRAY_CHUNKS,
     PT_ARRAY_POSITIONS,
     PT_ARRAY_ORDER,
-    PT_ARRAY_SURFACE,
+    PT_ARRAY_SURFELS,
     PT_ARRAY_COLORS,
     PT_ARRAY_OPACITIES,
     PT_ARRAY_RADII,
@@ -75,7 +75,7 @@ struct patina_cloud {
     struct pt_paged *paged; // of a cloud whose points arrive page by page (paged.h), else NULL
     float *positions;       // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
     uint32_t *order;        // slots: index in the caller's arrays
-    uint32_t *surface;      // slots: octahedral normal and spacing class (shared/words.h)
+    uint32_t *surfels;      // slots: octahedral normal and spacing class (shared/words.h)
     int beside;             // pt_shapes_beside; files keep it
     uint32_t *shapes;       // slots: footprint, thickness, kind (shared/words.h), or NULL where the cloud was not analysed
     void *colors;           // slots x 3 uint8 (sRGB) or float (linear), or NULL
@@ -112,8 +112,8 @@ uint32_t pt_class_of_spacing(double spacing, double base);
 int pt_cloud_settle_spacing(struct patina_cloud *cloud);
 int pt_cloud_settle_built(struct patina_cloud *cloud); // the same, of a cloud that is being built
 
-// The cone of the normals in these surface words.
-void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface);
+// The cone of the normals in these surfels.
+void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surfels);
 
 // Octahedral encoding of any non-zero finite vector: 26 bits, nearest of the four roundings.
 uint32_t pt_encode_normal(const double n[3]);
@@ -162,7 +162,7 @@ int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32
 void pt_read_vector(const patina_array *array, uint64_t index, double v[3]);
 
 // Building a cloud out of a checked descriptor. FREELY: as many chunks as the points' places ask for. EVENLY: as their number says, so
-// that it is known before. PART, of a larger cloud: its spacings are settled when all parts are there, so that surface words lack their
+// that it is known before. PART, of a larger cloud: its spacings are settled when all parts are there, so that surfels lack their
 // classes, chunks `built`, and opacities stay where all are opaque. The error is not told yet: pt_cloud_tell does it.
 enum pt_build_kind { PT_BUILD_FREELY, PT_BUILD_EVENLY, PT_BUILD_PART };
 int pt_cloud_check_desc(patina_cloud_desc *desc);

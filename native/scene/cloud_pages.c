@@ -12,7 +12,7 @@ void pt_cloud_sections(struct patina_cloud *cloud, struct pt_section sections[PT
         [PT_ARRAY_CHUNKS] = {(void **)&cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks},
         [PT_ARRAY_POSITIONS] = {(void **)&cloud->positions, slots * 12},
         [PT_ARRAY_ORDER] = {(void **)&cloud->order, slots * 4},
-        [PT_ARRAY_SURFACE] = {(void **)&cloud->surface, slots * 4},
+        [PT_ARRAY_SURFELS] = {(void **)&cloud->surfels, slots * 4},
         [PT_ARRAY_COLORS] = {&cloud->colors, cloud->color_format ? slots * pt_color_size(cloud->color_format) + 4 : 0},
         [PT_ARRAY_OPACITIES] = {(void **)&cloud->opacities, cloud->info.has_opacities ? slots + 4 : 0},
         [PT_ARRAY_RADII] = {(void **)&cloud->radii, cloud->info.has_radii ? slots * 4 : 0},
@@ -46,7 +46,7 @@ uint64_t pt_cloud_mapped_bytes(const struct patina_cloud *cloud)
 uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array)
 {
     static const uint8_t bytes[PT_ARRAYS] = {
-        [PT_ARRAY_POSITIONS] = 12, [PT_ARRAY_ORDER] = 4,   [PT_ARRAY_SURFACE] = 4, [PT_ARRAY_OPACITIES] = 1,
+        [PT_ARRAY_POSITIONS] = 12, [PT_ARRAY_ORDER] = 4,   [PT_ARRAY_SURFELS] = 4, [PT_ARRAY_OPACITIES] = 1,
         [PT_ARRAY_RADII] = 4,      [PT_ARRAY_SCALARS] = 4, [PT_ARRAY_CLASSES] = 1, [PT_ARRAY_SHAPES] = 4};
     if (!(cloud->mapped >> array & 1u))
         return 0;

@@ -56,7 +56,7 @@ static double distance(const struct fill *fill, const struct pt_chunk *chunk, si
 
 static double density(const struct patina_cloud *cloud, const struct pt_chunk *chunk, size_t slot)
 {
-    const double own = cloud->spacing_base * pt_spacing_of_class(cloud->surface[slot] >> PT_SPACING_SHIFT);
+    const double own = cloud->spacing_base * pt_spacing_of_class(cloud->surfels[slot] >> PT_SPACING_SHIFT);
     const double spacing = own > 0.0 ? own : (double)chunk->spacing;
     return spacing > 0.0 ? 1.0 / (spacing * spacing) : 0.0;
 }

@@ -68,7 +68,7 @@ static uint64_t fingerprint_array(uint64_t seed, const struct patina_cloud *clou
 static uint64_t fingerprint_of(const struct patina_cloud *cloud)
 {
     uint64_t hash = fingerprint_array(cloud->info.count, cloud, cloud->positions, cloud->slots * 12);
-    hash = fingerprint_array(hash, cloud, cloud->surface, cloud->slots * 4);
+    hash = fingerprint_array(hash, cloud, cloud->surfels, cloud->slots * 4);
     if (cloud->shapes)
         hash = fingerprint_array(hash, cloud, cloud->shapes, cloud->slots * 4);
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {

@@ -44,14 +44,14 @@ uint32_t pt_encode_normal(const double n[3])
     return word;
 }
 
-void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface)
+void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surfels)
 {
     double axis[3] = {0.0, 0.0, 0.0}, n[3], cosine = 1.0;
     chunk->cone_cosine = -2.0f;
     for (uint32_t i = 0; i < chunk->count; i++) {
-        if ((surface[i] & PT_NORMAL_BITS) == PT_NORMAL_NONE)
+        if ((surfels[i] & PT_NORMAL_BITS) == PT_NORMAL_NONE)
             return;
-        pt_decode_normal(surface[i] & PT_NORMAL_BITS, n);
+        pt_decode_normal(surfels[i] & PT_NORMAL_BITS, n);
         for (int k = 0; k < 3; k++)
             axis[k] += n[k];
     }
@@ -63,7 +63,7 @@ void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface)
         chunk->cone_axis[k] = (float)axis[k];
     }
     for (uint32_t i = 0; i < chunk->count; i++) {
-        pt_decode_normal(surface[i] & PT_NORMAL_BITS, n);
+        pt_decode_normal(surfels[i] & PT_NORMAL_BITS, n);
         cosine = fmin(cosine, n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2]);
     }
     chunk->cone_cosine = (float)(cosine - 1e-6);

@@ -22,7 +22,7 @@ enum { AXES = 32, GRID = 2048, NEIGHBOURS = 16, ROUNDS = 3 };
 struct orient {
     const struct pt_neighbours *tree;
     const struct pt_chunk *chunks;
-    uint32_t *surface, *shapes;
+    uint32_t *surfels, *shapes;
     const uint32_t *told;
     int16_t *votes, *next;          // of the normal as it is: positive stays
     _Atomic uint32_t *front, *back; // greatest and least depth of a texel, as float bits
@@ -134,10 +134,10 @@ static void project(const struct orient *orient, const struct pt_chunk *chunk, s
 // As pt_decode_normal, but for their length, and many at a time.
 static void face(const struct orient *orient, const struct pt_chunk *chunk, struct projected *out)
 {
-    const uint32_t *surface = orient->surface + chunk->first;
+    const uint32_t *surfels = orient->surfels + chunk->first;
     const float ax = orient->axis[2][0], ay = orient->axis[2][1], az = orient->axis[2][2];
     for (uint32_t i = 0; i < chunk->count; i++) {
-        float x = (float)((int32_t)(surface[i] & 0x1FFFu) - 4095), y = (float)((int32_t)(surface[i] >> 13 & 0x1FFFu) - 4095);
+        float x = (float)((int32_t)(surfels[i] & 0x1FFFu) - 4095), y = (float)((int32_t)(surfels[i] >> 13 & 0x1FFFu) - 4095);
         const float z = 4095.0f - fabsf(x) - fabsf(y), fold = z < 0.0f ? -z : 0.0f;
         x = x >= 0.0f ? x - fold : x + fold;
         y = y >= 0.0f ? y - fold : y + fold;
@@ -196,7 +196,7 @@ static void vote(void *context, uint32_t begin, uint32_t end, uint32_t thread)
         for (uint32_t i = 0; i < chunk->count; i++) {
             const uint32_t slot = chunk->first + i;
             size_t at;
-            if (fabsf(p.facing[i]) < STEEPEST * p.length[i] || (orient->surface[slot] & PT_NORMAL_BITS) == PT_NORMAL_NONE ||
+            if (fabsf(p.facing[i]) < STEEPEST * p.length[i] || (orient->surfels[slot] & PT_NORMAL_BITS) == PT_NORMAL_NONE ||
                 !texel_of(orient, &p, i, &at))
                 continue;
             const float facing = p.facing[i] / p.length[i];
@@ -227,7 +227,7 @@ static void share_votes(void *context, uint32_t begin, uint32_t end, uint32_t th
         for (uint32_t left = pt_leaf_lanes(tree, leaf); left; left &= left - 1) {
             const uint32_t lane = (uint32_t)__builtin_ctz(left), slot = tree->slots[leaf * PT_LEAF + lane];
             orient->next[slot] = orient->votes[slot];
-            few |= (uint32_t)(abs(orient->votes[slot]) < FEW && (orient->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE)
+            few |= (uint32_t)(abs(orient->votes[slot]) < FEW && (orient->surfels[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE)
                    << lane;
         }
         if (few)
@@ -235,9 +235,9 @@ static void share_votes(void *context, uint32_t begin, uint32_t end, uint32_t th
         for (; few; few &= few - 1) {
             const uint32_t lane = (uint32_t)__builtin_ctz(few), slot = tree->slots[leaf * PT_LEAF + lane];
             double n[3], m[3], sum = orient->votes[slot];
-            pt_decode_normal(orient->surface[slot] & PT_NORMAL_BITS, n);
+            pt_decode_normal(orient->surfels[slot] & PT_NORMAL_BITS, n);
             for (uint32_t i = 0; i < found.count[lane]; i++) {
-                const uint32_t other = tree->slots[found.place[lane][i]], bits = orient->surface[other] & PT_NORMAL_BITS;
+                const uint32_t other = tree->slots[found.place[lane][i]], bits = orient->surfels[other] & PT_NORMAL_BITS;
                 if (bits == PT_NORMAL_NONE)
                     continue;
                 pt_decode_normal(bits, m);
@@ -252,12 +252,12 @@ static void share_votes(void *context, uint32_t begin, uint32_t end, uint32_t th
 static void turn(struct orient *orient, uint32_t slot)
 {
     struct pt_neighbourhood hood;
-    const uint32_t bits = orient->surface[slot] & PT_NORMAL_BITS;
+    const uint32_t bits = orient->surfels[slot] & PT_NORMAL_BITS;
     pt_unpack_shape(orient->shapes[slot], bits, 1.0, &hood); // for its axis
     for (int k = 0; k < 3; k++)
         hood.normal[k] = -hood.normal[k];
     const uint32_t turned = pt_encode_normal(hood.normal), angle = 63u << PT_SHAPE_ANGLE_SHIFT;
-    orient->surface[slot] = (orient->surface[slot] & ~PT_NORMAL_BITS) | turned;
+    orient->surfels[slot] = (orient->surfels[slot] & ~PT_NORMAL_BITS) | turned;
     orient->shapes[slot] = (orient->shapes[slot] & ~angle) | (pt_pack_shape(&hood, turned, 1.0) & angle);
 }
 
@@ -270,9 +270,9 @@ static void turn_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         for (uint32_t i = 0; i < chunk->padded; i++) {
             const uint32_t slot = chunk->first + i;
             if (i >= chunk->count) { // repeats the last
-                orient->surface[slot] = orient->surface[slot - 1];
+                orient->surfels[slot] = orient->surfels[slot - 1];
                 orient->shapes[slot] = orient->shapes[slot - 1];
-            } else if ((orient->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE && orient->votes[slot] < 0 &&
+            } else if ((orient->surfels[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE && orient->votes[slot] < 0 &&
                        !(orient->told && orient->told[slot / 32] >> slot % 32 & 1u)) {
                 turn(orient, slot);
             }
@@ -306,11 +306,11 @@ static int run(struct orient *orient, struct pt_pool *pool, struct patina_progre
     return error;
 }
 
-int pt_orient(const struct pt_neighbours *tree, const struct pt_chunk *chunks, const uint32_t *told, uint32_t *surface,
+int pt_orient(const struct pt_neighbours *tree, const struct pt_chunk *chunks, const uint32_t *told, uint32_t *surfels,
               uint32_t *shapes, struct pt_pool *pool, struct patina_progress *progress, double begin, double end)
 {
     const size_t votes = tree->cloud->slots * sizeof(int16_t), grid = (size_t)GRID * GRID * 4;
-    struct orient orient = {.tree = tree, .chunks = chunks, .told = told, .surface = surface, .shapes = shapes};
+    struct orient orient = {.tree = tree, .chunks = chunks, .told = told, .surfels = surfels, .shapes = shapes};
     orient.votes = pt_pages_alloc(votes);
     orient.next = pt_pages_alloc(votes);
     orient.front = pt_pages_alloc(grid);

@@ -76,12 +76,12 @@ static int settle_page(struct patina_cloud *cloud, const struct pt_page *page, d
         const float spacing = own > 0.0 ? (float)(1.0 / sqrt(over + beneath / (own * own))) : 0.0f;
         changed |= chunk->spacing != spacing;
         chunk->spacing = chunk->built = spacing;
-        uint32_t *surface = cloud->surface + chunk->first;
+        uint32_t *surfels = cloud->surfels + chunk->first;
         const uint32_t class = pt_class_of_spacing((double)spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
         const uint32_t normals = (1u << PT_SPACING_SHIFT) - 1u;
-        if ((surface[0] & ~normals) != class)
+        if ((surfels[0] & ~normals) != class)
             for (uint32_t k = 0; k < chunk->padded; k++)
-                surface[k] = (surface[k] & normals) | class;
+                surfels[k] = (surfels[k] & normals) | class;
     }
     return changed;
 }
@@ -131,7 +131,7 @@ static void drop_page(struct patina_cloud *cloud, struct pt_page *page)
 {
     struct pt_section sections[PT_ARRAYS];
     pt_cloud_sections(cloud, sections);
-    static const enum pt_array points[] = {PT_ARRAY_POSITIONS, PT_ARRAY_ORDER,   PT_ARRAY_SURFACE,
+    static const enum pt_array points[] = {PT_ARRAY_POSITIONS, PT_ARRAY_ORDER,   PT_ARRAY_SURFELS,
                                            PT_ARRAY_COLORS,    PT_ARRAY_SCALARS, PT_ARRAY_CLASSES};
     const uint32_t bytes[] = {12, 4, 4, (uint32_t)pt_color_size(cloud->color_format), 4, 1};
     for (size_t i = 0; i < sizeof points / sizeof *points; i++)

@@ -50,7 +50,7 @@ static void copy_page(struct patina_cloud *cloud, struct pt_page *page, const st
 {
     const uint64_t at = page->first_slot, slots = page->slots, color = pt_color_size(cloud->color_format);
     memcpy(cloud->positions + 3 * at, made->positions, 12 * slots);
-    memcpy(cloud->surface + at, made->surface, 4 * slots);
+    memcpy(cloud->surfels + at, made->surfels, 4 * slots);
     for (uint64_t i = 0; i < slots; i++)
         cloud->order[at + i] = page->first_number + made->order[i];
     if (color)

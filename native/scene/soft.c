@@ -21,7 +21,7 @@ float pt_soft_radius(const struct patina_cloud *cloud, const struct pt_chunk *ch
 {
     if (cloud->radii)
         return cloud->radii[slot];
-    const double own = cloud->spacing_base * pt_spacing_of_class(cloud->surface[slot] >> PT_SPACING_SHIFT),
+    const double own = cloud->spacing_base * pt_spacing_of_class(cloud->surfels[slot] >> PT_SPACING_SHIFT),
                  mean = (double)chunk->spacing;
     return (float)(RADIUS_SPACINGS * (own > 0.0 ? fmin(own, widest(cloud) * mean) : mean));
 }

@@ -22,7 +22,7 @@ layout(std430, binding = BIND_arguments) readonly buffer arguments_block { avera
 layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[]; };
 layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
 layout(std430, binding = BIND_normal) buffer normal_block { vec4 normal[]; };
@@ -112,7 +112,7 @@ void main()
         if (args.sifted != 0u && chunk.sifted != 0u &&
             (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
             continue;
-        uint id = chunk.first + i, word = surface[id];
+        uint id = chunk.first + i, word = surfels[id];
         if (chunk.cull != 0u && pt_faces_away(chunk, word, p))
             continue;
         float footprint = pt_footprint(view, z);

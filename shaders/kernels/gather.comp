@@ -19,7 +19,7 @@ layout(std430, binding = BIND_arguments) readonly buffer arguments_block {
 layout(std430, binding = BIND_points) writeonly buffer points_block { vec4 records[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_field) readonly buffer field_block { uint field[]; };
 layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
 layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
@@ -95,7 +95,7 @@ vec3 light(point p)
     if (args.recolor.source != 0u || args.recolor.graded != 0u)
         color = recolor(view, args.eye_z, ray, p.z, style, color);
 #if LIT
-    uint word = surface[p.id];
+    uint word = surfels[p.id];
     vec3 object = pt_decode_normal(word), n;
     for (int k = 0; k < 3; k++)
         n[k] = pt_dot(vec3(args.instance.normal_matrix[3 * k], args.instance.normal_matrix[3 * k + 1],

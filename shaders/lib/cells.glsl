@@ -19,7 +19,7 @@ layout(local_size_x = 32, local_size_y = 8) in;
 layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
@@ -72,7 +72,7 @@ bool pt_point_of(chunk_view chunk, uint i, out pt_cell_point point)
         (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
         return false;
     point.id = chunk.first + i;
-    if (chunk.cull != 0u && pt_faces_away(chunk, surface[point.id], p))
+    if (chunk.cull != 0u && pt_faces_away(chunk, surfels[point.id], p))
         return false;
     // 2. on the nearest surface of its cell
     point.x = x;

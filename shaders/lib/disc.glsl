@@ -19,7 +19,7 @@ layout(location = 2) uniform uint instance;    // whose points these are
 
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_radii) readonly buffer radii_block { uint radii[]; }; // floats or shape words
 
 #if LARGE == 0
@@ -290,7 +290,7 @@ bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
     d.y = y;
     d.z = z;
     d.id = chunk.first + slot;
-    uint word = surface[d.id];
+    uint word = surfels[d.id];
     if (chunk.cull != 0u && pt_faces_away(chunk, word, p))
         return false;
     disc_size(d.id, word, d);

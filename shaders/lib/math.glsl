@@ -84,7 +84,7 @@ float pt_dot(vec3 a, vec3 b)
     return d;
 }
 
-// The octahedral normal of a surface word, not yet unit. The caller has excluded PT_NORMAL_NONE.
+// The octahedral normal of a surfel, not yet unit. The caller has excluded PT_NORMAL_NONE.
 vec3 pt_decode_normal(uint word)
 {
     const float step_size = 1.0 / 4095.0;

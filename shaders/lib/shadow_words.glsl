@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shadow words: what a sample's maps take of a point's light; twin of native/device_cpu/kernels/lit_words.h
+// Shadow words: what a sample's maps take of a point's light; twin of native/device_cpu/kernels/shadow_words.h
 #ifndef PT_SHADOW_WORDS_GLSL
 #define PT_SHADOW_WORDS_GLSL
 

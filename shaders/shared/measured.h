@@ -32,8 +32,8 @@ struct normals_args {
     uint32_t steep;  // 1: of a light's map, where a low sun sees the ground at a few degrees
 };
 
-// surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff; from = the pixel itself. span: d_eff as if no sigma were known.
-struct surface_args {
+// resolve: key -> view-space normal, 1 / max(|n.v|, C), d_eff; from = the pixel itself. span: d_eff as if no sigma were known.
+struct resolve_args {
     struct view_args view;
     struct instance_args instance;
     float sigma_scale;  // times instance.spacing of its class: sigma, as in assess_args; 0: shapes are not read

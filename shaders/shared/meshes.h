@@ -79,7 +79,7 @@ struct paint_args {
     struct mesh_args mesh;
 };
 
-// locate: of pixels that show the mesh, in view space: places: x of a row's pixels, then y, z, row after row; words: surface words
+// locate: of pixels that show the mesh, in view space: places: x of a row's pixels, then y, z, row after row; words: surfels
 // without spacing, of the triangle's plane. Others stay.
 struct locate_args {
     struct view_args view;

@@ -72,7 +72,7 @@ struct magnify_args {
     float pixel, inverse; // 1 / pixel
     float d_min; // as in instance_args
     uint32_t behind; // 1: the limit plane holds
-    uint32_t with_span; // as in surface_args
+    uint32_t with_span; // as in resolve_args
     uint32_t pass;      // bits PT_RANGE_*
     uint32_t id_base, id_count; // of the instance
     float most;         // where finer ones follow: cells of more points are not sharp

@@ -5,13 +5,13 @@
 
 #include "shared/view.h"
 
-// lit: a texel is this much wider than it is, so that a plane that crosses it from corner to corner stays within d_eff.
+// shadow_test: a texel is this much wider than it is, so that a plane that crosses it from corner to corner stays within d_eff.
 #define PT_TEXEL_SLACK 1.5f
-// lit: so many of the 8 texels around must shadow the point as well: one or two texels by themselves are a stray point, whose
+// shadow_test: so many of the 8 texels around must shadow the point as well: one or two texels by themselves are a stray point, whose
 // shadow is a speck. A line of texels has them.
 #define PT_SHADOW_SUPPORT 2
 #define PT_SHADOW_STEEP 20.0f // 1 / C
-// lit: a texel this many times its d_eff behind the one beside it shows another surface, under lights that look in perspective.
+// shadow_test: a texel this many times its d_eff behind the one beside it shows another surface, under lights that look in perspective.
 #define PT_SHADOW_APART 4.0f
 
 // mark: a byte of 1 for every point that the picture shows, measured or as the source of filled pixels.
@@ -20,7 +20,7 @@ struct mark_args {
     uint32_t id_base, id_count;
 };
 
-// lit: points against the filled map of a light [D 6], SPEC 4. A point is in shadow if z > z_map + d_eff, d_eff of the point in
+// shadow_test: points against the filled map of a light [D 6], SPEC 4. A point is in shadow if z > z_map + d_eff, d_eff of the point in
 // this view with a texel PT_TEXEL_SLACK wider. Without a normal, d_eff is at least that of the surface that the map shows there,
 // and z_map the greatest of the 3 x 3 texels around, in perspective of those within PT_SHADOW_APART times that surface's d_eff
 // behind it: no slope gives acne, and shadows of suns, which see the ground at 2 degrees, end a texel early. Where one of these
@@ -29,7 +29,7 @@ struct mark_args {
 // texels around, too.
 // Points outside the window or before z_near are lit. With `faint` the caster's points have opacities of their own: the loss is
 // also in proportion to that of the point that the map shows.
-struct lit_args {
+struct shadow_test_args {
     struct view_args view;         // of the map
     struct instance_args instance; // of the receiver: d_min, spacing, normals towards the light
     float window[4];  // x0, y0, x1, y1: pixels of the full picture that count
@@ -48,7 +48,7 @@ struct lit_args {
 // take all light.
 struct dim_args {
     struct view_args view; // of the map
-    float window[4];       // as in lit_args, as are these:
+    float window[4];       // as in shadow_test_args, as are these:
     uint32_t base, alone, close, samples, compare, marked;
     uint32_t veils;        // slabs of the plane
     float veil_from, veil_scale; // as in soft_args; 1 / veil_deep
@@ -59,7 +59,7 @@ struct dim_args {
 struct limit_args {
     struct view_args view;
     uint32_t caster; // first id of the only cloud that casts
-    uint32_t loss;   // as in lit_args
+    uint32_t loss;   // as in shadow_test_args
 };
 
 #endif

@@ -66,7 +66,7 @@ struct chunk_view {
     uint32_t record;             // gather: where those of its points begin
 };
 
-// What the per-instance kernels (normals, surface, shade) know of an instance of a cloud.
+// What the per-instance kernels (normals, resolve, shade) know of an instance of a cloud.
 struct instance_args {
     uint32_t id_base, id_count; // ids of this instance: [id_base, id_base + id_count)
     uint32_t has_normals;

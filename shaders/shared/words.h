@@ -5,7 +5,7 @@
 
 #include "shared/view.h"
 
-// The surface word of a point: octahedral normal 2 x 13 bits (at most 0.03 degrees off), spacing class 6 bits.
+// The surfel of a point: octahedral normal 2 x 13 bits (at most 0.03 degrees off), spacing class 6 bits.
 #define PT_NORMAL_NONE 0x03FFFFFFu // these 26 bits all ones: the point has no normal
 #define PT_NORMAL_BITS 0x03FFFFFFu
 #define PT_SPACING_SHIFT 26

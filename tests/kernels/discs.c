@@ -79,7 +79,7 @@ struct disc_scene discs_in_window(struct harness *h, struct rng *rng, uint32_t w
     return scene;
 }
 
-static uint32_t surface_word(struct ref_vec n)
+static uint32_t surfel(struct ref_vec n)
 {
     const double size = fabs(n.x) + fabs(n.y) + fabs(n.z);
     double x = n.x / size, y = n.y / size;
@@ -111,7 +111,7 @@ void discs_beside(struct harness *h, struct rng *rng, struct disc_scene *scene, 
         *points_coordinate(cloud, 0, i, 0) = (float)at.x;
         *points_coordinate(cloud, 0, i, 1) = (float)at.y;
         *points_coordinate(cloud, 0, i, 2) = (float)at.z;
-        cloud->surface[i] = surface_word(n);
+        cloud->surfels[i] = surfel(n);
     }
     discs_describe(h, rng, scene, instance, &camera, radius, 0.25, 1);
 }
@@ -134,7 +134,7 @@ struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
         points_pad(cloud);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
         buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-        buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
         buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->slots);
     }
     const struct splat_args splat = {.view = points->view, .instances = points->count, .behind = points->limit != NULL};
@@ -161,7 +161,7 @@ struct ref_disc *discs_reference(struct harness *h, const struct disc_scene *sce
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
             for (uint32_t s = 0; s < cloud->chunks[c].count; s++)
                 discs[n++] = ref_disc(&scene->points.view, &scene->discs[i], &cloud->chunks[c], cloud->positions,
-                                      cloud->surface, scene->radii[i], s);
+                                      cloud->surfels, scene->radii[i], s);
     }
     qsort(discs, n, sizeof *discs, by_id);
     *count = n;

@@ -57,9 +57,9 @@ struct cloud *points_add_cloud(struct harness *h, struct rng *rng, struct scene 
         cloud->slots += chunk->padded;
     }
     cloud->positions = harness_alloc(h, 12 * (size_t)cloud->slots);
-    cloud->surface = harness_alloc(h, 4 * (size_t)cloud->slots);
+    cloud->surfels = harness_alloc(h, 4 * (size_t)cloud->slots);
     for (uint32_t i = 0; i < cloud->slots; i++)
-        cloud->surface[i] = rng_below(rng, 8) ? (uint32_t)rng_next(rng) : PT_NORMAL_NONE;
+        cloud->surfels[i] = rng_below(rng, 8) ? (uint32_t)rng_next(rng) : PT_NORMAL_NONE;
     return cloud;
 }
 
@@ -84,7 +84,7 @@ void points_pad(struct cloud *cloud)
         for (uint32_t i = chunk->count; i < chunk->padded; i++) {
             for (int axis = 0; axis < 3; axis++)
                 *points_coordinate(cloud, c, i, axis) = *points_coordinate(cloud, c, chunk->count - 1, axis);
-            cloud->surface[chunk->first + i] = cloud->surface[chunk->first + chunk->count - 1];
+            cloud->surfels[chunk->first + i] = cloud->surfels[chunk->first + chunk->count - 1];
         }
     }
 }

@@ -11,7 +11,7 @@ struct cloud {
     struct chunk_view *chunks;
     uint32_t chunk_count, slots;
     float *positions;
-    uint32_t *surface;
+    uint32_t *surfels;
 };
 
 struct scene {

@@ -92,7 +92,7 @@ static void hold_against(struct harness *h, const struct setup *s, const struct 
     size_t unsure = 0, shown = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++, count++) {
-            tents[count] = ref_tent(&s->args, &cloud->chunks[c], cloud->positions, cloud->surface, i);
+            tents[count] = ref_tent(&s->args, &cloud->chunks[c], cloud->positions, cloud->surfels, i);
             looks[count] = look_of(s, cloud->chunks[c].first + i);
         }
     for (size_t p = 0; p < (size_t)width * s->scene.view.height; p++) {
@@ -151,14 +151,14 @@ static struct planes run(struct harness *h, struct rng *rng, struct setup *s, do
     struct pt_buffer *from = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
     struct pt_buffer *chunks = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
     struct pt_buffer *positions = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-    struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
+    struct pt_buffer *surfels = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->color_bytes);
     struct pt_buffer *drawn = harness_buffer(h, scene->drawn, 4 * (size_t)scene->words);
     const struct scatter_args scatter = {.view = scene->view, .instances = 1, .sifted = s->args.sifted};
-    struct pt_buffer *const scattered[] = {keys, NULL, s->args.sifted ? drawn : NULL, chunks, positions, surface};
+    struct pt_buffer *const scattered[] = {keys, NULL, s->args.sifted ? drawn : NULL, chunks, positions, surfels};
     harness_run(h, PT_KERNEL_scatter, &scatter, sizeof scatter, scattered, 6);
-    const struct surface_args of_pixels = {.view = scene->view, .instance = s->args.instance};
-    HARNESS_RUN(h, surface, &of_pixels, keys, surface, normal, deff, from, NULL, NULL);
+    const struct resolve_args of_pixels = {.view = scene->view, .instance = s->args.instance};
+    HARNESS_RUN(h, resolve, &of_pixels, keys, surfels, normal, deff, from, NULL, NULL);
     planes.keys = harness_read(h, keys);
     planes.from = harness_read(h, from);
     planes.deff = harness_read(h, deff);
@@ -167,7 +167,7 @@ static struct planes run(struct harness *h, struct rng *rng, struct setup *s, do
     keys = harness_buffer(h, planes.keys, pixels * 8);
     from = harness_buffer(h, planes.from, pixels * 4);
     struct pt_buffer *const buffers[] = {keys,   from,      deff,    normal, albedo,
-                                         chunks, positions, surface, colors, s->args.sifted ? drawn : NULL};
+                                         chunks, positions, surfels, colors, s->args.sifted ? drawn : NULL};
     harness_run(h, PT_KERNEL_average, &s->args, sizeof s->args, buffers, 10);
     planes.normal = harness_read(h, normal);
     planes.albedo = harness_read(h, albedo);
@@ -217,7 +217,7 @@ static void sheet(struct harness *h)
     for (int k = 0; k < 9; k++)
         s.args.instance.normal_matrix[k] = k % 4 ? 0.0f : 1.0f;
     for (uint32_t i = 0; i < cloud->slots; i++)
-        cloud->surface[i] = 4095u | 4095u << 13;
+        cloud->surfels[i] = 4095u | 4095u << 13;
     for (uint32_t c = 0; c < 3; c++)
         cloud->chunks[c].cull = 0;
     memset(s.colors, 128, s.color_bytes);

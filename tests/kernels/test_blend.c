@@ -240,12 +240,12 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     buffers[n++] = NULL; // drawn
     for (uint32_t i = 0; i < points->count; i++) {
         const struct cloud *cloud = &points->clouds[i];
-        struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
-        const struct surface_args of_pixels = {.view = points->view, .instance = scene->discs[i].instance};
-        HARNESS_RUN(h, surface, &of_pixels, keys, surface, zero, deff, from, NULL, NULL);
+        struct pt_buffer *surfels = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
+        const struct resolve_args of_pixels = {.view = points->view, .instance = scene->discs[i].instance};
+        HARNESS_RUN(h, resolve, &of_pixels, keys, surfels, zero, deff, from, NULL, NULL);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
         buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-        buffers[n++] = surface;
+        buffers[n++] = surfels;
         buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->slots);
         buffers[n++] = harness_buffer(h, paint->colors[i], paint->color_bytes[i]);
         buffers[n++] = harness_buffer(h, paint->opacities[i], cloud->slots + 4);
@@ -395,7 +395,7 @@ static void camera_plane(struct harness *h)
     points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, 0), 1.0);
     discs_describe(h, &rng, &scene, 0, &camera, 0.0f, 0.6, 1);
     for (uint32_t i = 0; i < scene.points.clouds[0].slots; i++)
-        scene.points.clouds[0].surface[i] = (uint32_t)rng_next(&rng);
+        scene.points.clouds[0].surfels[i] = (uint32_t)rng_next(&rng);
     for (int i = 0; i < 2; i++)
         discs_beside(h, &rng, &scene, 60.0, 0.25f);
     const struct paint colors = paint(h, &rng, &scene);
@@ -425,7 +425,7 @@ static void sheet(struct harness *h)
             *points_coordinate(cloud, c, i, 1) = (float)rng_range(&rng, -2.0, 2.0);
         }
     for (uint32_t i = 0; i < cloud->slots; i++)
-        cloud->surface[i] = 4095u | 4095u << 13;
+        cloud->surfels[i] = 4095u | 4095u << 13;
     discs_describe(h, &rng, &scene, 0, &camera, 0.2f, 0.0, 1);
     struct paint colors = paint(h, &rng, &scene);
     memset(colors.colors[0], 128, colors.color_bytes[0]);
@@ -457,7 +457,7 @@ static void hidden(struct harness *h)
             *points_coordinate(cloud, c, i, 2) -= c ? 1.0f : 0.0f;
         }
     for (uint32_t i = 0; i < cloud->slots; i++)
-        cloud->surface[i] = 4095u | 4095u << 13;
+        cloud->surfels[i] = 4095u | 4095u << 13;
     discs_describe(h, &rng, &scene, 0, &camera, 0.2f, 0.0, 1);
     const struct paint colors = paint(h, &rng, &scene);
     const size_t marked = run(h, &scene, &colors).marked;
@@ -474,7 +474,7 @@ static void overflow(struct harness *h)
     camera.shift[0] = camera.shift[1] = 0.0;
     struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, many, 4, 0, 0);
     for (uint32_t i = 0; i < cloud->slots; i++)
-        cloud->surface[i] = PT_NORMAL_NONE;
+        cloud->surfels[i] = PT_NORMAL_NONE;
     discs_describe(h, &rng, &scene, 0, &camera, 0.05f, 0.0, 0);
     scene.discs[0].instance.color_format = 2;
     struct paint colors = {.color_bytes = {12 * (size_t)cloud->slots + 4}};

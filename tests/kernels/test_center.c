@@ -29,7 +29,7 @@ static uint64_t *keys_of(struct harness *h, struct scene *scene, struct pt_buffe
         points_pad(cloud);
         buffers[n++] = chunks[i] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
         buffers[n++] = positions[i] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-        buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     }
     struct scatter_args args = {.view = scene->view, .instances = scene->count};
     harness_run(h, PT_KERNEL_scatter, &args, sizeof args, buffers, n);

@@ -57,7 +57,7 @@ static void hold_against(struct harness *h, const struct setup *s, const struct 
     size_t unsure = 0, shown = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++, count++) {
-            points[count].splat = ref_scatter(&s->scene.view, &cloud->chunks[c], cloud->positions, cloud->surface, i);
+            points[count].splat = ref_scatter(&s->scene.view, &cloud->chunks[c], cloud->positions, cloud->surfels, i);
             points[count].place = ref_place(&s->scene.view, &cloud->chunks[c], cloud->positions, i);
             scans[count] = s->scans[cloud->chunks[c].first + i];
         }
@@ -102,12 +102,12 @@ static struct cells run(struct harness *h, struct setup *s, double open)
     struct pt_buffer *inclined = harness_buffer(h, s->inclined, (size_t)CELLS * 16);
     struct pt_buffer *chunks = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
     struct pt_buffer *positions = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-    struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
+    struct pt_buffer *surfels = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     struct pt_buffer *scans = harness_buffer(h, s->scans, (size_t)cloud->slots * 2 + 4);
     struct pt_buffer *drawn = s->args.sifted ? harness_buffer(h, scene->drawn, 4 * (size_t)scene->words) : NULL;
     const struct scatter_args scatter = {.view = scene->view, .instances = 1, .sifted = s->args.sifted};
-    HARNESS_RUN(h, scatter, &scatter, keys, NULL, drawn, chunks, positions, surface);
-    HARNESS_RUN(h, differ, &s->args, keys, inclined, least, most, chunks, positions, surface, scans, drawn);
+    HARNESS_RUN(h, scatter, &scatter, keys, NULL, drawn, chunks, positions, surfels);
+    HARNESS_RUN(h, differ, &s->args, keys, inclined, least, most, chunks, positions, surfels, scans, drawn);
     cells.keys = harness_read(h, keys);
     cells.least = harness_read(h, least);
     cells.most = harness_read(h, most);

@@ -76,7 +76,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, ui
 // What the word may become: the loss is a whole number next to the exact one.
 static int admissible(const struct dim_args *args, uint32_t before, uint32_t now, const double loss[2])
 {
-    struct lit_args as = {.alone = args->alone, .close = args->close, .samples = args->samples};
+    struct shadow_test_args as = {.alone = args->alone, .close = args->close, .samples = args->samples};
     for (double k = floor(loss[0] + 0.49); k <= floor(loss[1] + 0.51); k++) {
         as.loss = (uint32_t)k;
         if (ref_shadow_word(&as, before, k > 0.0) == now)

@@ -154,7 +154,7 @@ static uint32_t run(struct harness *h, const struct setup *s)
     uint32_t drawn = 0;
     struct pt_buffer *points = harness_buffer(h, harness_alloc(h, size), size);
     HARNESS_RUN(h, gather, &s->args, points, harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
-                harness_buffer(h, cloud->positions, 12 * slots), harness_buffer(h, cloud->surface, 4 * slots),
+                harness_buffer(h, cloud->positions, 12 * slots), harness_buffer(h, cloud->surfels, 4 * slots),
                 harness_buffer(h, s->field, 4 * slots),
                 instance->color_format ? harness_buffer(h, s->colors, s->colors_size) : NULL,
                 instance->has_opacities ? harness_buffer(h, s->opacities, (slots + 3) / 4 * 4) : NULL,
@@ -162,7 +162,7 @@ static uint32_t run(struct harness *h, const struct setup *s)
     const float *got = harness_read(h, points);
     harness_same(h, "records", got, (size_t)PT_SOFT_WORDS * s->records, 4, PT_SOFT_WORDS, s->records);
     const struct ref_planes planes = {
-        .surface = cloud->surface, .colors = s->colors, .opacities = s->opacities, .shadows = s->shadows};
+        .surfels = cloud->surfels, .colors = s->colors, .opacities = s->opacities, .shadows = s->shadows};
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].padded; i++) {
             const float *record = got + PT_SOFT_WORDS * (size_t)(cloud->chunks[c].record + i);
@@ -268,7 +268,7 @@ static void ends(struct harness *h)
         if (i % 5 == 0)
             s.field[i] &= ~PT_FIELD_RADIUS;
         if (i % 7 == 0)
-            cloud->surface[i] |= PT_NORMAL_NONE;
+            cloud->surfels[i] |= PT_NORMAL_NONE;
         if (i % 11 == 0)
             s.field[i] |= 0xFFFFu << PT_FIELD_SHIFT;
         if (i % 13 == 0)

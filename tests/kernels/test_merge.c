@@ -63,7 +63,7 @@ static void hold_against(struct harness *h, const struct setup *s, const struct 
     size_t unsure = 0, shown = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++, count++) {
-            points[count].splat = ref_scatter(&s->scene.view, &cloud->chunks[c], cloud->positions, cloud->surface, i);
+            points[count].splat = ref_scatter(&s->scene.view, &cloud->chunks[c], cloud->positions, cloud->surfels, i);
             points[count].place = ref_place(&s->scene.view, &cloud->chunks[c], cloud->positions, i);
             points[count].look = look_of(s, cloud->chunks[c].first + i);
         }
@@ -112,13 +112,13 @@ static struct cells run(struct harness *h, struct setup *s, double open)
     struct pt_buffer *place = harness_buffer(h, unset, count * 16);
     struct pt_buffer *chunks = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
     struct pt_buffer *positions = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-    struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
+    struct pt_buffer *surfels = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->color_bytes);
     struct pt_buffer *opacities = s->opacities ? harness_buffer(h, s->opacities, (size_t)cloud->slots + 4) : NULL;
     struct pt_buffer *drawn = s->args.sifted ? harness_buffer(h, scene->drawn, 4 * (size_t)scene->words) : NULL;
     const struct scatter_args scatter = {.view = scene->view, .instances = 1, .sifted = s->args.sifted};
-    HARNESS_RUN(h, scatter, &scatter, keys, NULL, drawn, chunks, positions, surface);
-    HARNESS_RUN(h, merge, &s->args, keys, place, merged, chunks, positions, surface, colors, opacities, drawn);
+    HARNESS_RUN(h, scatter, &scatter, keys, NULL, drawn, chunks, positions, surfels);
+    HARNESS_RUN(h, merge, &s->args, keys, place, merged, chunks, positions, surfels, colors, opacities, drawn);
     cells.keys = harness_read(h, keys);
     cells.place = harness_read(h, place);
     cells.merged = harness_read(h, merged);

@@ -30,9 +30,9 @@ static float *run(struct harness *h, const struct picture *picture, const struct
                   const float *before)
 {
     struct pt_buffer *keys = harness_buffer(h, picture->keys, picture->count * 8);
-    struct pt_buffer *surface = harness_buffer(h, words, (size_t)(args->instance.id_count + !args->instance.id_count) * 4);
+    struct pt_buffer *surfels = harness_buffer(h, words, (size_t)(args->instance.id_count + !args->instance.id_count) * 4);
     struct pt_buffer *normal = harness_buffer(h, before, picture->count * 16);
-    HARNESS_RUN(h, normals, args, keys, surface, normal);
+    HARNESS_RUN(h, normals, args, keys, surfels, normal);
     float *got = harness_read(h, normal);
     harness_same(h, "normal", got, picture->count * 4, 4, 4, picture->view.width);
     return got;
@@ -47,7 +47,7 @@ static void check(struct harness *h, const struct picture *picture, const struct
     const float *got = run(h, picture, args, words, before);
     if (harness_settled(h))
         return;
-    struct ref_planes planes = {.keys = picture->keys, .surface = words};
+    struct ref_planes planes = {.keys = picture->keys, .surfels = words};
     for (size_t i = 0; i < picture->count; i++) {
         int x = (int)(i % picture->view.width), y = (int)(i / picture->view.width);
         const float *n = got + 4 * i;
@@ -157,7 +157,7 @@ static void analytic(struct harness *h)
                 args.instance.d_min = 1000.0f;
                 uint32_t *words = words_without(h, &rng, picture.count);
                 const float *got = run(h, &picture, &args, words, picture.normal);
-                struct ref_planes planes = {.keys = picture.keys, .surface = words};
+                struct ref_planes planes = {.keys = picture.keys, .surfels = words};
                 for (size_t i = 0; i < picture.count; i++) {
                     if (picture.keys[i] == REF_EMPTY_KEY)
                         continue;

@@ -23,7 +23,7 @@ static uint64_t *run_scatter(struct harness *h, struct scene *scene)
         points_pad(cloud);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
         buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-        buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     }
     struct scatter_args args = {.view = scene->view, .instances = scene->count, .behind = scene->limit != NULL};
     args.sifted = scene->drawn != NULL;
@@ -57,7 +57,7 @@ static uint64_t *check_scene(struct harness *h, struct scene *scene)
         const struct cloud *cloud = &scene->clouds[i];
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
             for (uint32_t s = 0; s < cloud->chunks[c].count; s++) {
-                splats[n] = ref_scatter(&scene->view, &cloud->chunks[c], cloud->positions, cloud->surface, s);
+                splats[n] = ref_scatter(&scene->view, &cloud->chunks[c], cloud->positions, cloud->surfels, s);
                 const uint32_t word = cloud->chunks[c].sifted;
                 if (word && !(scene->drawn[word - 1 + s / PT_SLOTS_A_WORD] >> s % PT_SLOTS_A_WORD & 1u))
                     splats[n].possible = 0;
@@ -361,7 +361,7 @@ static void culling(struct harness *h)
         *points_coordinate(cloud, 0, i, 0) = (float)i + 0.5f;
         *points_coordinate(cloud, 0, i, 1) = 0.5f;
         *points_coordinate(cloud, 0, i, 2) = -3.0f;
-        cloud->surface[i] = words[i];
+        cloud->surfels[i] = words[i];
     }
     uint64_t *keys = check_scene(h, &scene);
     for (uint32_t i = 0; i < 4; i++) {
@@ -413,7 +413,7 @@ static void note_rows(const struct scene *scene, const struct cloud *cloud, stru
 {
     chunk->row_first = scene->view.height;
     for (uint32_t s = 0; s < chunk->count; s++) {
-        struct ref_splat splat = ref_scatter(&scene->view, chunk, cloud->positions, cloud->surface, s);
+        struct ref_splat splat = ref_scatter(&scene->view, chunk, cloud->positions, cloud->surfels, s);
         if (!splat.possible)
             continue;
         uint32_t first = splat.y0 < 0 ? 0 : (uint32_t)splat.y0, end = (uint32_t)splat.y1 + 1;

@@ -149,7 +149,7 @@ static void points(struct harness *h)
         HARNESS_RUN(h, scatter, &args, plane, NULL, NULL,
                     harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
                     harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots),
-                    harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots));
+                    harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots));
         const uint64_t *scattered = harness_read(h, plane);
         for (size_t i = 0; i < pixels; i++)
             if (keys[i] != scattered[i])
@@ -228,7 +228,7 @@ static void large(struct harness *h)
             *points_coordinate(cloud, 0, i, 0) = (float)rng_range(&rng, -0.8, 0.8);
             *points_coordinate(cloud, 0, i, 1) = (float)rng_range(&rng, -0.5, 0.5);
             *points_coordinate(cloud, 0, i, 2) = -1.0f - (float)i;
-            cloud->surface[i] = (4095u + rng_below(&rng, 1500)) | (4095u - rng_below(&rng, 1500)) << 13;
+            cloud->surfels[i] = (4095u + rng_below(&rng, 1500)) | (4095u - rng_below(&rng, 1500)) << 13;
         }
         discs_describe(h, &rng, &scene, 0, &camera, 0.0f, 0.0, 1);
         for (uint32_t i = 0; i < DISCS; i++) // the nearer, the smaller
@@ -268,7 +268,7 @@ static void coincident(struct harness *h)
         for (uint32_t i = 0; i < 3; i++) {
             struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, bases[i]);
             for (uint32_t k = 0; k < cloud->slots; k++)
-                cloud->surface[k] = 5000u | 3000u << 13;
+                cloud->surfels[k] = 5000u | 3000u << 13;
             discs_describe(h, &rng, &scene, i, &camera, 0.8f, 0.0, 1);
         }
         const uint64_t *keys = check_scene(h, &scene);
@@ -298,7 +298,7 @@ static void edge_on(struct harness *h)
             *points_coordinate(cloud, 0, i, 0) = p ? 0.0f : (float)(0.8 * i + 0.45);
             *points_coordinate(cloud, 0, i, 1) = (float)(0.1 * i + 0.05);
             *points_coordinate(cloud, 0, i, 2) = -1.0f;
-            cloud->surface[i] = 8190u | (4095u + (uint32_t)(lean[i] * 4095.0)) << 13;
+            cloud->surfels[i] = 8190u | (4095u + (uint32_t)(lean[i] * 4095.0)) << 13;
         }
         discs_describe(h, &rng, &scene, 0, &camera, 0.2f, 0.0, 1);
         const uint64_t *keys = check_scene(h, &scene);

@@ -10,12 +10,12 @@
 static double middle(struct ref_range r) { return 0.5 * (r.lo + r.hi); }
 
 struct ref_tent ref_tent(const struct average_args *args, const struct chunk_view *chunk, const float *positions,
-                         const uint32_t *surface, uint32_t slot)
+                         const uint32_t *surfels, uint32_t slot)
 {
     const struct view_args *view = &args->view;
     const struct instance_args *instance = &args->instance;
-    const uint32_t id = chunk->first + slot, word = surface[id];
-    const struct ref_splat splat = ref_scatter(view, chunk, positions, surface, slot);
+    const uint32_t id = chunk->first + slot, word = surfels[id];
+    const struct ref_splat splat = ref_scatter(view, chunk, positions, surfels, slot);
     struct ref_tent tent = {.id = chunk->id_base + id, .possible = splat.possible, .definite = splat.definite};
     struct ref_vec own;
     if (!tent.possible)

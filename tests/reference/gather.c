@@ -36,7 +36,7 @@ static double field_radius(const struct gather_args *args, uint32_t word)
 static void light(const struct gather_args *args, const struct ref_planes *points, uint32_t id, struct ref_record *out)
 {
     struct shade_args shade = args->shade;
-    const uint32_t from = 0, word = points->surface[id];
+    const uint32_t from = 0, word = points->surfels[id];
     struct view_args *view = &shade.view;
     const double before = view->perspective ? out->place[2] : 1.0;
     struct ref_vec n;

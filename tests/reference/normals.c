@@ -62,7 +62,7 @@ static enum ref_truth gather(const struct normals_args *args, const struct ref_p
     const struct instance_args *instance = &args->instance;
     uint64_t key = planes->keys[(size_t)y * view->width + (size_t)x];
     double z = ref_key_z(key);
-    uint32_t word = planes->surface[ref_key_id(key) - instance->id_base];
+    uint32_t word = planes->surfels[ref_key_id(key) - instance->id_base];
     double m = ref_layer_minimum(view, instance->d_min, instance->spacing[word >> PT_SPACING_SHIFT], z);
     double spacings = m / ref_footprint(view, z), off = TOL_QUOTIENT * spacings;
     int radius = window_radius(spacings, args->radius);

@@ -67,7 +67,7 @@ double ref_sure_minimum(const struct view_args *view, double d_min, double sigma
 // A pixel's own d_eff at the view's level, from the level-0 planes at its `from`.
 struct ref_range ref_level_distance(const struct view_args *view, const float *normal, const float *deff, uint32_t from,
                                     struct ref_range z);
-// Octahedral normal of a surface word, unit. 0 when it has none.
+// Octahedral normal of a surfel, unit. 0 when it has none.
 int ref_decode_normal(uint32_t word, struct ref_vec *normal);
 double ref_srgb(uint8_t value); // sRGB to linear
 
@@ -95,7 +95,7 @@ struct ref_splat {
 };
 // positions, surface: of the instance. slot counts from the chunk's first; with that, it is the point's id.
 struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
-                             const uint32_t *surface, uint32_t slot);
+                             const uint32_t *surfels, uint32_t slot);
 
 // Where a point is on screen, in pixels of the full picture.
 struct ref_place {
@@ -145,7 +145,7 @@ struct ref_disc {
     int shaped;
 };
 struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *args, const struct chunk_view *chunk,
-                         const float *positions, const uint32_t *surface, const void *radii, uint32_t slot);
+                         const float *positions, const uint32_t *surfels, const void *radii, uint32_t slot);
 // Whether it covers a pixel of the plane, how deep, and at which squared share of its radius from its middle.
 struct ref_met {
     enum ref_truth covered;
@@ -177,7 +177,7 @@ struct ref_planes {
     const uint64_t *keys;
     const uint32_t *from;
     const float *normal, *deff, *span, *color, *shading;
-    const uint32_t *surface;  // by id - id_base
+    const uint32_t *surfels;  // by id - id_base
     const uint32_t *shapes;   // likewise
     const void *colors;       // by id - id_base
     const uint8_t *opacities; // by id - id_base
@@ -214,7 +214,7 @@ struct ref_tent {
     int across; // the view, so that float32 may turn it either way
 };
 struct ref_tent ref_tent(const struct average_args *args, const struct chunk_view *chunk, const float *positions,
-                         const uint32_t *surface, uint32_t slot);
+                         const uint32_t *surfels, uint32_t slot);
 struct ref_average {
     double color[3], color_error[3];
     struct ref_vec n;
@@ -226,7 +226,7 @@ struct ref_average ref_average(const struct average_args *args, const struct ref
                                uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int measured, int x,
                                int y);
 
-struct ref_surface {
+struct ref_resolve {
     struct ref_vec n;
     double normal_error;
     double inverse; // 1 / max(|n.v|, C)
@@ -235,7 +235,7 @@ struct ref_surface {
     double span, span_error;
     uint32_t from;
 };
-struct ref_surface ref_surface(const struct surface_args *args, const struct ref_planes *planes, int x, int y);
+struct ref_resolve ref_resolve(const struct resolve_args *args, const struct ref_planes *planes, int x, int y);
 
 // What a pixel shows of a triangle.
 struct ref_cover {
@@ -248,7 +248,7 @@ struct ref_cover {
 struct ref_cover ref_cover(const struct cover_args *args, const float *vertices, const uint32_t *indices, uint64_t key,
                            uint64_t mesh_key, float limit, int x, int y);
 
-// Where a pixel that shows a triangle lies, and its plane's normal (as ref_cover has it) in the steps of a surface word.
+// Where a pixel that shows a triangle lies, and its plane's normal (as ref_cover has it) in the steps of a surfel.
 struct ref_locate {
     struct ref_vec p, n; // view space
     double error, normal_error;
@@ -303,13 +303,13 @@ int ref_mark(const struct mark_args *args, const struct ref_planes *planes, uint
 float ref_limit(const struct limit_args *args, const struct ref_planes *planes, int x, int y);
 
 // Is the point of this slot in shadow? planes: of the light's map.
-enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
-                       const float *positions, uint32_t slot);
+enum ref_truth ref_shadow_test(const struct shadow_test_args *args, const struct ref_planes *planes,
+                               const struct chunk_view *chunk, const float *positions, uint32_t slot);
 // What the map takes of 255 from that point, if it is in its shadow. 0: float32 may find the point at another texel.
-int ref_lit_loss(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
-                 const float *positions, uint32_t slot, uint32_t *loss);
+int ref_shadow_test_loss(const struct shadow_test_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
+                         const float *positions, uint32_t slot, uint32_t *loss);
 // A shadow word after a sample whose map says so.
-uint32_t ref_shadow_word(const struct lit_args *args, uint32_t word, int shadowed);
+uint32_t ref_shadow_word(const struct shadow_test_args *args, uint32_t word, int shadowed);
 
 struct ref_shade {
     struct ref_vec n; // the normal that lights the pixel

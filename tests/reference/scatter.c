@@ -75,7 +75,7 @@ struct ref_place ref_place(const struct view_args *view, const struct chunk_view
 }
 
 struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
-                             const uint32_t *surface, uint32_t slot)
+                             const uint32_t *surfels, uint32_t slot)
 {
     const float *base = positions + 3 * (size_t)chunk->first;
     double p[3] = {base[slot], base[chunk->padded + slot], base[2 * (size_t)chunk->padded + slot]};
@@ -104,7 +104,7 @@ struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_vi
     if (floor(sx.lo) != floor(sx.hi) || floor(sy.lo) != floor(sy.hi))
         splat.definite = 0;
 
-    enum ref_truth culled = ref_culled(chunk, p, chunk->cull ? surface[id] : 0);
+    enum ref_truth culled = ref_culled(chunk, p, chunk->cull ? surfels[id] : 0);
     splat.possible = culled != REF_YES;
     if (culled != REF_NO)
         splat.definite = 0;

@@ -58,11 +58,11 @@ static void set_axes(const struct disc_args *args, uint32_t shape, double radius
 }
 
 struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *args, const struct chunk_view *chunk,
-                         const float *positions, const uint32_t *surface, const void *radii, uint32_t slot)
+                         const float *positions, const uint32_t *surfels, const void *radii, uint32_t slot)
 {
     const float *base = positions + 3 * (size_t)chunk->first;
     const double p[3] = {base[slot], base[chunk->padded + slot], base[2 * (size_t)chunk->padded + slot]};
-    const uint32_t id = chunk->first + slot, word = surface[id];
+    const uint32_t id = chunk->first + slot, word = surfels[id];
     struct ref_disc disc = {.id = chunk->id_base + id, .place = ref_place(view, chunk, positions, slot), .n = {0, 0, 1}};
     disc.has_normals = args->instance.has_normals != 0;
     const struct ref_place *at = &disc.place;

@@ -26,7 +26,7 @@ struct dealt {
     const struct patina_cloud *from;
     struct pt_chunk *chunks;
     float *positions;
-    uint32_t *order, *surface, *shapes;
+    uint32_t *order, *surfels, *shapes;
     uint8_t *colors;
     uint32_t chunk_count;
     uint64_t slots;
@@ -41,7 +41,7 @@ static void copy_point(struct dealt *to, const struct pt_chunk *source, uint32_t
         place[chunk->count][k] = (float)(p + (source->origin[k] - chunk->origin[k]));
     }
     to->order[out] = from->order[slot];
-    to->surface[out] = from->surface[slot];
+    to->surfels[out] = from->surfels[slot];
     to->shapes[out] = from->shapes[slot];
     memcpy(to->colors + 3 * out, (const uint8_t *)from->colors + 3 * slot, 3);
     chunk->count++;
@@ -77,11 +77,11 @@ static void end_chunk(struct dealt *to, float (*place)[3], float gap)
     }
     for (uint64_t i = last + 1; i < first + chunk->padded; i++) {
         to->order[i] = to->order[last];
-        to->surface[i] = to->surface[last];
+        to->surfels[i] = to->surfels[last];
         to->shapes[i] = to->shapes[last];
         memcpy(to->colors + 3 * i, to->colors + 3 * last, 3);
     }
-    pt_chunk_cone(chunk, to->surface + first);
+    pt_chunk_cone(chunk, to->surfels + first);
     to->slots += chunk->padded;
     to->chunk_count++;
 }
@@ -124,7 +124,7 @@ static void take_over(patina_cloud *cloud, struct dealt *to)
     const uint64_t old = cloud->slots, slots = to->slots;
     replace((void **)&cloud->positions, old * 12, to->positions, slots * 12);
     replace((void **)&cloud->order, old * 4, to->order, slots * 4);
-    replace((void **)&cloud->surface, old * 4, to->surface, slots * 4);
+    replace((void **)&cloud->surfels, old * 4, to->surfels, slots * 4);
     replace((void **)&cloud->shapes, old * 4, to->shapes, slots * 4);
     replace(&cloud->colors, old * 3 + 4, to->colors, slots * 3 + 4);
     free(cloud->chunks);
@@ -141,10 +141,10 @@ void levels_make(patina_cloud *cloud, uint32_t levels, struct level *out)
     to.chunks = calloc(most / PT_CHUNK_POINTS + levels + 2, sizeof *to.chunks);
     to.positions = malloc(most * 12);
     to.order = malloc(most * 4);
-    to.surface = malloc(most * 4);
+    to.surfels = malloc(most * 4);
     to.shapes = malloc(most * 4);
     to.colors = calloc(most + 2, 3);
-    if (!place || !to.chunks || !to.positions || !to.order || !to.surface || !to.shapes || !to.colors || !cloud->shapes ||
+    if (!place || !to.chunks || !to.positions || !to.order || !to.surfels || !to.shapes || !to.colors || !cloud->shapes ||
         cloud->color_format != PT_COLOR_SRGB8)
         support_die("levels: out of memory, or the cloud was not analysed or has no colours");
     for (uint32_t level = 0; level < levels; level++) {

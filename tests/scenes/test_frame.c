@@ -289,7 +289,7 @@ static void test_statistics(void **state)
         assert_true(stats.ms > 0.0 && stats.plane_bytes > 0);
         assert_int_equal(stats.points, 1800);
         assert_true(stats.points_scattered <= stats.points && stats.chunks_culled <= stats.chunks);
-        static const char *const always[] = {"scatter", "surface", "fill", "shade", "smooth", "antialias"};
+        static const char *const always[] = {"scatter", "resolve", "fill", "shade", "smooth", "antialias"};
         const char *together = json_member(full, "passes", "tail"); // the passes from shading on, where they run as one
         double sum = together ? strtod(together, NULL) : 0.0;
         for (uint32_t i = 0; i < (together ? 3 : sizeof always / sizeof always[0]); i++) {

@@ -497,7 +497,7 @@ static uint64_t *scatter_behind(patina_frame *frame, const struct pt_plan *plan,
     CHECK(pt_residency_take(&frame->residency, device, cloud, &resident), device);
     struct scatter_args args = {.view = plan->view, .instances = 1, .behind = 1};
     struct pt_buffer none = {0}, *buffers[] = {&keys, &frame->planes.at[PT_PLANE_LIMIT][0], &none,
-                                               &list, &resident->buffers[PT_POSITIONS],     &resident->buffers[PT_SURFACE]};
+                                               &list, &resident->buffers[PT_POSITIONS],     &resident->buffers[PT_SURFELS]};
     CHECK(device->ops->run(device, PT_KERNEL_scatter, &args, sizeof args, buffers, 6, NULL), device);
     CHECK(device->ops->buffer_read(device, &keys, 0, out, pixels * 8), device);
     device->ops->buffer_destroy(device, &keys);

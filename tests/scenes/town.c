@@ -159,7 +159,7 @@ static void add_points(struct town *town, const struct level *level, const uint3
             (uint8_t)(((const uint8_t *)from->colors)[i] * (200 + (place[0] * 7 + place[1] * (5 + i % 3)) % 56) >> 8);
     pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, from->positions + 3 * first, slots * 12);
     pt_cloud_writer_add(town->writer, PT_ARRAY_ORDER, town->order, slots * 4);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_SURFACE, from->surface + first, slots * 4);
+    pt_cloud_writer_add(town->writer, PT_ARRAY_SURFELS, from->surfels + first, slots * 4);
     pt_cloud_writer_add(town->writer, PT_ARRAY_COLORS, town->colors, slots * 3);
     pt_cloud_writer_add(town->writer, PT_ARRAY_SHAPES, from->shapes + first, slots * 4);
 }

@@ -308,7 +308,7 @@ static void test_far_away(void **state)
     analyse(other, 0);
     assert_int_equal(one->slots, other->slots);
     assert_memory_equal(one->shapes, other->shapes, one->slots * 4);
-    assert_memory_equal(one->surface, other->surface, one->slots * 4);
+    assert_memory_equal(one->surfels, other->surfels, one->slots * 4);
     patina_cloud_destroy(one);
     patina_cloud_destroy(other);
     free(near);
@@ -406,7 +406,7 @@ static void test_threads(void **state)
         analyse(one, 1);
         analyse(other, 3);
         assert_memory_equal(one->shapes, other->shapes, one->slots * 4);
-        assert_memory_equal(one->surface, other->surface, one->slots * 4);
+        assert_memory_equal(one->surfels, other->surfels, one->slots * 4);
         assert_memory_equal(one->chunks, other->chunks, one->chunk_count * sizeof *one->chunks);
         assert_true(one->info.normals_oriented == (voted ? PATINA_SIDES_VOTED : 1u) && one->info.estimated_normals > 50000);
         patina_cloud_destroy(one);
@@ -429,11 +429,11 @@ static void test_orientation(void **state)
         const patina_analysis_desc how = {
             .struct_size = sizeof how, .keep_normals = way == 0, .station_count = way == 2, .stations = station};
         uint32_t *before = malloc(cloud->slots * 4);
-        memcpy(before, cloud->surface, cloud->slots * 4);
+        memcpy(before, cloud->surfels, cloud->slots * 4);
         CHECK(patina_cloud_analyse(cloud, &how, NULL), cloud);
         assert_true(cloud->info.normals_oriented);
         for (uint64_t slot = 0; slot < cloud->slots && way == 0; slot++)
-            assert_int_equal(before[slot] & PT_NORMAL_BITS, cloud->surface[slot] & PT_NORMAL_BITS);
+            assert_int_equal(before[slot] & PT_NORMAL_BITS, cloud->surfels[slot] & PT_NORMAL_BITS);
         struct read r = read_cloud(cloud);
         for (uint64_t i = 0; i < points.count; i++) {
             double dot = 0.0;

@@ -696,7 +696,7 @@ def test_plan():
     assert "scatter" in text and len(text.splitlines()) > 3
     text = run("render", "plan.ply", "--dump-plan", "--shadows", "--opacity", "0.5", "--layers", "3").stdout
     lines = [line.split(None, 1)[0] + " " + line.split()[1] for line in text.splitlines()]
-    for expected in ("fill KEYS", "loop samples", "loop faces", "plan map", "run scatter", "run lit", "loop layers", "layer 2:",
+    for expected in ("fill KEYS", "loop samples", "loop faces", "plan map", "run scatter", "run shadow_test", "loop layers", "layer 2:",
                      "read TILES", "run peel", "layer 3:", "run compose"):
         assert expected in lines, (expected, text)
     assert re.search(r"memory [\d.]+ MB of planes at most: \d+ of them share \d+ slabs\n  slab [\d.]+ MB: [A-Z_]+ \d \(\d+ to \d+\)", text), text

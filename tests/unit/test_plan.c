@@ -197,7 +197,7 @@ static void test_maps_are_plans(void **state)
     const struct pt_round round = {.points = 1}, nobody = {0};
     for (int i = 0; i < 2; i++)
         assert_int_equal(pt_plan_map(scene, &plan, &round, &maps[i]), PATINA_OK);
-    assert_int_equal(passes_of(&maps[0], PT_KERNEL_lit), 1);
+    assert_int_equal(passes_of(&maps[0], PT_KERNEL_shadow_test), 1);
     assert_int_equal(maps[0].pass_count, maps[1].pass_count);
     for (uint32_t i = 0; i < maps[0].pass_count; i++) {
         const struct pt_pass *a = &maps[0].passes[i], *b = &maps[1].passes[i];
@@ -621,7 +621,7 @@ static void test_passes_bind_what_their_kernels_list(void **state)
 
     const struct scatter_args scatter = {.instances = 2};
     const struct pt_ref chunks = pt_buffer_of(PT_CHUNKS, 0), places = pt_buffer_of(PT_POSITIONS, 0),
-                        words = pt_buffer_of(PT_SURFACE, 0);
+                        words = pt_buffer_of(PT_SURFELS, 0);
     const struct pt_ref two[] = {
         pt_plane_at(PT_PLANE_KEYS, 0), pt_nothing(), pt_nothing(), chunks, places, words, chunks, places, words};
     const struct pt_ref mixed[] = {pt_plane_at(PT_PLANE_KEYS, 0), pt_nothing(), pt_nothing(), chunks, words, places};
@@ -630,16 +630,16 @@ static void test_passes_bind_what_their_kernels_list(void **state)
     assert_int_equal(pt_check_bindings(PT_KERNEL_scatter, &scatter, mixed, 6), PATINA_ERROR_INTERNAL);
 
     // what is written has no other name in the pass: nothing stands in for it
-    const struct surface_args surface = {.with_span = 0};
+    const struct resolve_args resolve = {.with_span = 0};
     struct pt_ref refs[] = {pt_plane_at(PT_PLANE_KEYS, 0), words,        normal, deff,
                             pt_plane_at(PT_PLANE_FROM, 0), pt_nothing(), deff};
-    assert_int_equal(pt_check_bindings(PT_KERNEL_surface, &surface, refs, 7), PATINA_ERROR_INTERNAL);
+    assert_int_equal(pt_check_bindings(PT_KERNEL_resolve, &resolve, refs, 7), PATINA_ERROR_INTERNAL);
     refs[6] = pt_nothing();
-    assert_int_equal(pt_check_bindings(PT_KERNEL_surface, &surface, refs, 7), PATINA_OK);
+    assert_int_equal(pt_check_bindings(PT_KERNEL_resolve, &resolve, refs, 7), PATINA_OK);
 
     struct pt_plan plan = {0};
     struct pt_builder builder = {.plan = &plan};
-    pt_add(&builder, PT_KERNEL_surface, "surface", &surface, sizeof surface, refs, 6);
+    pt_add(&builder, PT_KERNEL_resolve, "resolve", &resolve, sizeof resolve, refs, 6);
     assert_int_equal(builder.failed, PATINA_ERROR_INTERNAL);
     pt_plan_destroy(&plan);
 }

@@ -115,7 +115,7 @@ static void project(const struct average *average, const struct band *band, cons
 {
     const struct view_args *view = &average->args->view;
     const float *positions = (const float *)PT_DATA(average->call, average, positions) + 3 * (size_t)chunk->first;
-    const uint32_t *surface = (const uint32_t *)PT_DATA(average->call, average, surface) + chunk->first;
+    const uint32_t *surfels = (const uint32_t *)PT_DATA(average->call, average, surfels) + chunk->first;
     const uint32_t *drawn = average->args->sifted ? PT_DATA(average->call, average, drawn) : NULL;
     const float below = (float)(view->origin_y + (int32_t)band->first) - PT_AVERAGE_WIDEST - 1.0f;
     const float above = (float)(view->origin_y + (int32_t)band->end) + PT_AVERAGE_WIDEST + 1.0f;
@@ -131,7 +131,7 @@ static void project(const struct average *average, const struct band *band, cons
         if (!vm_bits(some))
             continue;
         some = pt_keep_drawn(chunk, drawn, i, some);
-        const vi word = vi_load(surface + i);
+        const vi word = vi_load(surfels + i);
         if (chunk->cull)
             some = vm_and(some, vm_not(pt_faces_away(chunk, word, p)));
         if (!vm_bits(some))

@@ -55,7 +55,7 @@ struct pt_bins {
 
 // Both kernels read the same of an instance, in the same order.
 _Static_assert(PT_BUF_splat_positions - PT_BUF_splat_chunks == PT_BUF_blend_positions - PT_BUF_blend_chunks &&
-                   PT_BUF_splat_surface - PT_BUF_splat_chunks == PT_BUF_blend_surface - PT_BUF_blend_chunks &&
+                   PT_BUF_splat_surfels - PT_BUF_splat_chunks == PT_BUF_blend_surfels - PT_BUF_blend_chunks &&
                    PT_BUF_splat_radii - PT_BUF_splat_chunks == PT_BUF_blend_radii - PT_BUF_blend_chunks,
                "blend takes up splat's bins");
 
@@ -77,7 +77,7 @@ static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, ui
                                    view,
                                    (const float *)pt_bin_data(bins, PT_BUF_splat_positions, *instance) +
                                        3 * (size_t)view->first,
-                                   (const uint32_t *)pt_bin_data(bins, PT_BUF_splat_surface, *instance) + view->first,
+                                   (const uint32_t *)pt_bin_data(bins, PT_BUF_splat_surfels, *instance) + view->first,
                                    pt_bin_data(bins, PT_BUF_splat_radii, *instance)};
 }
 
@@ -178,7 +178,7 @@ static void pt_bin_chunk(struct pt_bins *bins, uint32_t thread, const struct pt_
         pt_load_points(source->positions, chunk->padded, i, p);
         pt_disc_project(source, p, vm_first(pt_lanes_left(i, chunk->count)), &discs);
         discs.id = vi_add(vi_set(chunk->first + i), vi_lanes());
-        vi word = vi_load(source->surface + i);
+        vi word = vi_load(source->surfels + i);
         pt_disc_cull(source, p, word, &discs);
         pt_disc_size(source->args, source->radii, discs.id, word, discs.drawn, &discs);
         pt_disc_reach(source->view, &discs);

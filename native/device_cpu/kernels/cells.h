@@ -34,7 +34,7 @@ struct pt_cells {
     const struct pt_cpu_call *call;
     const struct view_args *view;
     const float *positions;
-    const uint32_t *surface, *drawn; // drawn NULL: nothing is sifted
+    const uint32_t *surfels, *drawn; // drawn NULL: nothing is sifted
     const struct chunk_view *chunks;
     uint32_t chunk_count;
     // A block goes into its band's sums; means of PT_LANES cells from the one at `at` on, `count` of which there are, come out of them.
@@ -51,7 +51,7 @@ static inline void pt_cells_project(const struct pt_cells *cells, const struct p
 {
     const struct view_args *view = cells->view;
     const float *positions = cells->positions + 3 * (size_t)chunk->first;
-    const uint32_t *surface = cells->surface + chunk->first, *drawn = cells->drawn;
+    const uint32_t *surfels = cells->surfels + chunk->first, *drawn = cells->drawn;
     const struct pt_window window = pt_window_rows(view, (float)(view->origin_y + (int32_t)band->first),
                                                    (float)(view->origin_y + (int32_t)band->end));
     uint32_t count = 0;
@@ -64,7 +64,7 @@ static inline void pt_cells_project(const struct pt_cells *cells, const struct p
         if (!vm_bits(some))
             continue;
         if (chunk->cull)
-            some = vm_and(some, vm_not(pt_faces_away(chunk, vi_load(surface + i), p)));
+            some = vm_and(some, vm_not(pt_faces_away(chunk, vi_load(surfels + i), p)));
         const vf column = vf_floor(at[0]), row = vf_floor(at[1]);
         const vi cell = vi_add(vi_mul(vi_sub(vf_int(row), vi_set((uint32_t)view->origin_y)), vi_set(view->width)),
                                vi_sub(vf_int(column), vi_set((uint32_t)view->origin_x)));

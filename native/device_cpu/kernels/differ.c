@@ -93,7 +93,7 @@ int PT_KERNEL_ENTRY(differ)(const struct pt_cpu_call *call)
     struct pt_cells cells = {.call = call,
                              .view = &args->view,
                              .positions = PT_DATA(call, differ, positions),
-                             .surface = PT_DATA(call, differ, surface),
+                             .surfels = PT_DATA(call, differ, surfels),
                              .drawn = args->sifted ? PT_DATA(call, differ, drawn) : NULL,
                              .chunks = PT_DATA(call, differ, chunks),
                              .chunk_count = (uint32_t)(call->buffers[PT_BUF_differ_chunks]->size / sizeof(struct chunk_view)),

@@ -3,7 +3,7 @@
 //
 // Words of a cloud's points belong to one chunk each, so threads never meet.
 #include "device_cpu/points.h"
-#include "lit_words.h"
+#include "shadow_words.h"
 #include "shared/shadows.h"
 
 struct dim {

@@ -38,7 +38,7 @@ struct pt_disc_source {
     const struct disc_args *args;
     const struct chunk_view *chunk;
     const float *positions;  // of the chunk
-    const uint32_t *surface; // of the chunk
+    const uint32_t *surfels; // of the chunk
     const void *radii;       // floats or shape words
 };
 
@@ -165,7 +165,7 @@ static inline void pt_disc_project(const struct pt_disc_source *s, const vf p[3]
                       vm_and(vf_lt(vf_abs(d->x), far), vf_lt(vf_abs(d->y), far)));
 }
 
-// Leaves out those that face away: positions p, surface words.
+// Leaves out those that face away: positions p, surfels.
 static inline void pt_disc_cull(const struct pt_disc_source *s, const vf p[3], vi word, struct pt_discs *d)
 {
     if (s->chunk->cull)

@@ -115,7 +115,7 @@ static void gather_chunk(const struct gather *gather, const struct chunk_view *c
     const struct gather_args *args = gather->args;
     const struct instance_args *instance = &args->shade.instance;
     const uint32_t *field = (const uint32_t *)PT_DATA(gather->call, gather, field) + chunk->first;
-    const uint32_t *surface = (const uint32_t *)PT_DATA(gather->call, gather, surface) + chunk->first;
+    const uint32_t *surfels = (const uint32_t *)PT_DATA(gather->call, gather, surfels) + chunk->first;
     float *records = (float *)PT_DATA(gather->call, gather, points) + (size_t)PT_SOFT_WORDS * chunk->record;
     const vf none = vf_set(pt_float(PT_KEY_EMPTY_Z));
     for (uint32_t i = 0; i < chunk->padded; i += PT_LANES) {
@@ -126,7 +126,7 @@ static void gather_chunk(const struct gather *gather, const struct chunk_view *c
         if (vm_bits(points.some))
             place(gather, chunk, i, &points);
         if (vm_bits(points.some)) {
-            light(gather, &points, vi_load(surface + i), color);
+            light(gather, &points, vi_load(surfels + i), color);
             const vf own = pt_opacity(instance, PT_DATA(gather->call, gather, colors), PT_DATA(gather->call, gather, opacities),
                                       points.id, vi_set(0), points.some);
             const vi word = amount(args, &points, points.opacity * own);

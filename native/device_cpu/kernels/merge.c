@@ -81,7 +81,7 @@ int PT_KERNEL_ENTRY(merge)(const struct pt_cpu_call *call)
     struct pt_cells cells = {.call = call,
                              .view = &args->view,
                              .positions = PT_DATA(call, merge, positions),
-                             .surface = PT_DATA(call, merge, surface),
+                             .surfels = PT_DATA(call, merge, surfels),
                              .drawn = args->sifted ? PT_DATA(call, merge, drawn) : NULL,
                              .chunks = PT_DATA(call, merge, chunks),
                              .chunk_count = (uint32_t)(call->buffers[PT_BUF_merge_chunks]->size / sizeof(struct chunk_view)),

@@ -189,7 +189,7 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     vi_store(c.at, vi_select(ours, at, packed ? vi_set(PT_ROW_PAD) : at));
     c.z = vf_select(c.ours, depths_at(own, at, ours), vf_set(1.0f));
     c.w = linear_depth(view, c.z);
-    vi word = vi_gather(PT_DATA(job->call, normals, surface), id, c.ours);
+    vi word = vi_gather(PT_DATA(job->call, normals, surfels), id, c.ours);
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT));
     c.distance = vf_layer_distance(view, instance->d_min, spacing, c.z, vf_set(1.0f));
     c.slope = vf_set(4.0f) * vf_footprint(view, c.z); // 76 degrees

@@ -71,7 +71,7 @@ static struct window window_of(const struct view_args *view)
 
 // 1. Pixels and depths of points [first, last). What their pixels hold is asked for: a chunk's first points find it in memory.
 static inline void project(const struct view_args *view, const struct window *w, struct target target,
-                           const struct chunk_view *chunk, const float *positions, const uint32_t *surface, uint32_t first,
+                           const struct chunk_view *chunk, const float *positions, const uint32_t *surfels, uint32_t first,
                            uint32_t last, struct block *block)
 {
     uint32_t count = 0;
@@ -81,7 +81,7 @@ static inline void project(const struct view_args *view, const struct window *w,
         pt_project(view, chunk, p, at);
         vm inside = pt_keep_drawn(chunk, target.drawn, i, pt_within(&w->window, at));
         if (chunk->cull)
-            inside = vm_and(inside, vm_not(pt_faces_away(chunk, vi_load(surface + i), p)));
+            inside = vm_and(inside, vm_not(pt_faces_away(chunk, vi_load(surfels + i), p)));
         vi column = vi_sub(vf_int(vf_floor(at[0])), w->origin_x), row = vi_sub(vf_int(vf_floor(at[1])), w->origin_y);
         uint32_t lanes = vm_bits(inside);
         vi_pack(block->pixel + count, vi_add(vi_mul(row, w->width), column), lanes);
@@ -149,10 +149,10 @@ static void walk_chunk(const struct scatter *scatter, uint32_t c, struct walk *w
     const struct chunk_view *chunk = chunk_at(scatter, c, &walk->instance);
     const float *positions = (const float *)PT_DATA_EACH(scatter->call, scatter, positions, walk->instance) +
                              3 * (size_t)chunk->first;
-    const uint32_t *surface = (const uint32_t *)PT_DATA_EACH(scatter->call, scatter, surface, walk->instance) + chunk->first;
+    const uint32_t *surfels = (const uint32_t *)PT_DATA_EACH(scatter->call, scatter, surfels, walk->instance) + chunk->first;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK, walk->count++) {
         const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
-        project(&scatter->args->view, &walk->window, walk->target, chunk, positions, surface, first, last,
+        project(&scatter->args->view, &walk->window, walk->target, chunk, positions, surfels, first, last,
                 &walk->blocks[walk->count % 2]);
         if (walk->count)
             put(walk->target, &walk->blocks[(walk->count - 1) % 2]);

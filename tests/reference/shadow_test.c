@@ -8,7 +8,7 @@
 #include <math.h>
 
 // d_eff of the point: its own spacing and slope; the texel PT_TEXEL_SLACK wider.
-static struct ref_range layer_distance(const struct lit_args *args, const struct ref_place *place, uint32_t word,
+static struct ref_range layer_distance(const struct shadow_test_args *args, const struct ref_place *place, uint32_t word,
                                        int *has_normal)
 {
     const struct instance_args *instance = &args->instance;
@@ -86,15 +86,15 @@ static enum ref_truth supported(const struct view_args *view, const uint64_t *ke
     return surely >= PT_SHADOW_SUPPORT ? REF_YES : perhaps < PT_SHADOW_SUPPORT ? REF_NO : REF_UNSURE;
 }
 
-enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
-                       const float *positions, uint32_t slot)
+enum ref_truth ref_shadow_test(const struct shadow_test_args *args, const struct ref_planes *planes,
+                               const struct chunk_view *chunk, const float *positions, uint32_t slot)
 {
     const struct view_args *view = &args->view;
     struct ref_place place = ref_place(view, chunk, positions, slot);
     if (!place.known || place.z.hi < view->z_near)
         return REF_NO;
     int unsure = place.z.lo < view->z_near, shadowed = 0, lit = 0, has_normal;
-    uint32_t word = planes->surface[chunk->first + slot];
+    uint32_t word = planes->surfels[chunk->first + slot];
     struct ref_range own = layer_distance(args, &place, word, &has_normal);
     for (double py = floor(place.y.lo); py <= floor(place.y.hi); py++)
         for (double px = floor(place.x.lo); px <= floor(place.x.hi); px++) {
@@ -128,8 +128,8 @@ enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *pla
     return unsure || (shadowed && lit) ? REF_UNSURE : shadowed ? REF_YES : REF_NO;
 }
 
-int ref_lit_loss(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
-                 const float *positions, uint32_t slot, uint32_t *loss)
+int ref_shadow_test_loss(const struct shadow_test_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
+                         const float *positions, uint32_t slot, uint32_t *loss)
 {
     const struct view_args *view = &args->view;
     *loss = args->loss;
@@ -147,7 +147,7 @@ int ref_lit_loss(const struct lit_args *args, const struct ref_planes *planes, c
     return 1;
 }
 
-uint32_t ref_shadow_word(const struct lit_args *args, uint32_t word, int shadowed)
+uint32_t ref_shadow_word(const struct shadow_test_args *args, uint32_t word, int shadowed)
 {
     uint32_t sum = word & PT_SHADOW_SUM, lost = word >> PT_SHADOW_SHIFT;
     if (shadowed)

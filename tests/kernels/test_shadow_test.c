@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// lit: points before, on and behind the surfaces of a map, with normals and without; what samples and maps add up to.
+// shadow_test: points before, on and behind the surfaces of a map, with normals and without; what samples and maps add up to.
 #include "harness.h"
 #include "shared/shadows.h"
 #include "shared/words.h"
@@ -11,10 +11,10 @@ enum { POINTS = 3000, CHUNKS = 3, SLOTS = CHUNKS * 1024 };
 
 struct setup {
     struct picture map;
-    struct lit_args args;
+    struct shadow_test_args args;
     struct chunk_view chunks[CHUNKS];
     float *positions;
-    uint32_t *surface, *words;
+    uint32_t *surfels, *words;
     uint8_t *marks, *opacities; // opacities: of the map's points
 };
 
@@ -53,7 +53,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
 {
     struct setup s = {.map = picture_random(h, rng, picture_view(67, 45, perspective), kind, 0.5)};
     picture_invent(&s.map, rng, 0.7, 5);
-    s.args = (struct lit_args){.view = s.map.view, .loss = 255, .alone = 1, .samples = 1};
+    s.args = (struct shadow_test_args){.view = s.map.view, .loss = 255, .alone = 1, .samples = 1};
     s.args.window[0] = (float)s.map.view.origin_x;
     s.args.window[1] = (float)s.map.view.origin_y;
     s.args.window[2] = (float)(s.map.view.origin_x + (int32_t)s.map.view.width);
@@ -64,7 +64,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     for (int i = 0; i < 9; i++)
         s.args.instance.normal_matrix[i] = (float)rng_range(rng, -1.0, 1.0);
     s.positions = harness_alloc(h, SLOTS * 12);
-    s.surface = harness_alloc(h, SLOTS * 4);
+    s.surfels = harness_alloc(h, SLOTS * 4);
     s.words = harness_alloc(h, (SLOTS + 7) * 4);
     s.marks = harness_alloc(h, SLOTS);
     s.opacities = harness_alloc(h, s.map.count + 4);
@@ -72,7 +72,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
         s.opacities[i] = (uint8_t)rng_next(rng);
     s.args.caster = s.map.id_base;
     for (uint32_t i = 0; i < SLOTS; i++) {
-        s.surface[i] = (uint32_t)rng_next(rng) | (rng_below(rng, 10) ? 0 : PT_NORMAL_NONE);
+        s.surfels[i] = (uint32_t)rng_next(rng) | (rng_below(rng, 10) ? 0 : PT_NORMAL_NONE);
         s.marks[i] = (uint8_t)rng_below(rng, 2);
     }
     for (uint32_t c = 0; c < CHUNKS; c++) {
@@ -87,7 +87,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
 
 static void check(struct harness *h, const struct setup *s, uint32_t base, double most_open)
 {
-    struct lit_args args = s->args;
+    struct shadow_test_args args = s->args;
     size_t count = s->map.count, open = 0;
     uint32_t differs = 0, expected_differs = 0;
     args.base = base;
@@ -95,14 +95,14 @@ static void check(struct harness *h, const struct setup *s, uint32_t base, doubl
     struct pt_buffer *deff = harness_buffer(h, s->map.deff, count * 4);
     struct pt_buffer *chunks = harness_buffer(h, s->chunks, sizeof s->chunks);
     struct pt_buffer *positions = harness_buffer(h, s->positions, SLOTS * 12);
-    struct pt_buffer *surface = harness_buffer(h, s->surface, SLOTS * 4), *marks = harness_buffer(h, s->marks, SLOTS);
+    struct pt_buffer *surfels = harness_buffer(h, s->surfels, SLOTS * 4), *marks = harness_buffer(h, s->marks, SLOTS);
     struct pt_buffer *words = harness_buffer(h, s->words, (SLOTS + 7) * 4), *flag = harness_buffer(h, &differs, 4);
     struct pt_buffer *opacities = harness_buffer(h, s->opacities, count + 4);
-    HARNESS_RUN(h, lit, &args, keys, from, deff, chunks, positions, surface, marks, words, flag, opacities);
+    HARNESS_RUN(h, shadow_test, &args, keys, from, deff, chunks, positions, surfels, marks, words, flag, opacities);
     const uint32_t *got = harness_read(h, words), *got_flag = harness_read(h, flag);
     harness_same(h, "words", got, SLOTS + 7, 4, 1, SLOTS + 7);
     struct ref_planes planes = picture_planes(&s->map);
-    planes.surface = s->surface;
+    planes.surfels = s->surfels;
     planes.opacities = s->opacities;
     for (uint32_t c = 0; c < CHUNKS; c++)
         for (uint32_t i = 0; i < s->chunks[c].count; i++) {
@@ -112,9 +112,9 @@ static void check(struct harness *h, const struct setup *s, uint32_t base, doubl
                     harness_fail(h, "unmarked", (int)id, 0, "was tested");
                 continue;
             }
-            enum ref_truth truth = ref_lit(&args, &planes, &s->chunks[c], s->positions, i);
-            struct lit_args own = args;
-            if (!ref_lit_loss(&args, &planes, &s->chunks[c], s->positions, i, &own.loss)) {
+            enum ref_truth truth = ref_shadow_test(&args, &planes, &s->chunks[c], s->positions, i);
+            struct shadow_test_args own = args;
+            if (!ref_shadow_test_loss(&args, &planes, &s->chunks[c], s->positions, i, &own.loss)) {
                 open++;
                 continue;
             }
@@ -222,9 +222,9 @@ static void agreement(struct harness *h)
 static void sanity(struct harness *h)
 {
     uint64_t keys[9];
-    uint32_t from[9], surface = PT_NORMAL_NONE;
+    uint32_t from[9], surfels = PT_NORMAL_NONE;
     float deff[9], positions[3 * 16] = {0};
-    struct lit_args args = {
+    struct shadow_test_args args = {
         .view = {.width = 3, .height = 3, .ray_x0 = -1.5f, .ray_xs = 1.0f, .ray_y0 = -1.5f, .ray_ys = 1.0f, .footprint = 1e-3f},
         .loss = 255,
         .alone = 1,
@@ -238,44 +238,44 @@ static void sanity(struct harness *h)
     }
     args.instance.spacing[0] = 0.1f;
     set_chunk(&args.view, &chunk);
-    struct ref_planes planes = {.keys = keys, .from = from, .deff = deff, .surface = &surface};
+    struct ref_planes planes = {.keys = keys, .from = from, .deff = deff, .surfels = &surfels};
     positions[32] = -2.45f; // within what the map's own surface allows
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_NO);
     positions[32] = -2.55f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_YES);
     keys[0] = ref_key(2.2f, 0); // one neighbour is farther
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_NO);
     keys[0] = REF_EMPTY_KEY; // the surface ends there: 20 times 0.2
     positions[32] = -5.95f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_NO);
     positions[32] = -6.05f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_YES);
     keys[0] = ref_key(2.2f, 0);
     positions[32] = -2.55f;
     args.instance.has_normals = 1;
-    surface = 4095u | 4095u << 13; // towards the light: 0.2
+    surfels = 4095u | 4095u << 13; // towards the light: 0.2
     for (int k = 0; k < 9; k += 4)
         args.instance.normal_matrix[k] = 1.0f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_YES);
     positions[32] = -2.19f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_NO);
     positions[32] = -1.0f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_NO);
     positions[32] = -2.55f;
     for (uint32_t i = 0; i < 9; i++)
         keys[i] = i == 4 ? keys[i] : REF_EMPTY_KEY;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_NO);
     keys[3] = keys[5] = keys[4];
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_YES);
     for (uint32_t i = 0; i < 9; i++)
         keys[i] = ref_key(i == 4 ? 1.5f : i == 0 ? 3.6f : 1.5f, i); // in perspective: beyond 1.5 + 4 * 0.5 lies another surface
     args.view.perspective = 1;
     args.instance.has_normals = 0;
     chunk = (struct chunk_view){.count = 1, .padded = 16};
     set_chunk(&args.view, &chunk);
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_YES);
     keys[0] = ref_key(3.4f, 0);
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_shadow_test(&args, &planes, &chunk, positions, 0) == REF_NO);
     args.loss = 128;
     HARNESS_CHECK(h, ref_shadow_word(&args, 255, 1) == 255 + 128 && ref_shadow_word(&args, 255, 0) == 255);
 }
@@ -291,7 +291,7 @@ static void two_ways(struct harness *h)
             for (int i = 0; i < 8; i++) // hardly a hole: without normals little is dark beside one
                 picture_invent(&s.map, &rng, 1.0, 5);
             struct ref_planes planes = picture_planes(&s.map);
-            planes.surface = s.surface;
+            planes.surfels = s.surfels;
             s.args.instance.has_normals = normals;
             uint64_t *nearest = harness_alloc(h, s.map.count * 8);
             uint8_t *marked = harness_alloc(h, SLOTS);
@@ -305,7 +305,8 @@ static void two_ways(struct harness *h)
                         uint32_t id = s.chunks[c].first + i;
                         struct ref_place place = ref_place(&s.args.view, &s.chunks[c], s.positions, i);
                         // what the map does not reach is discarded, what is marked left out
-                        if (marked[id] || !place.known || ref_lit(&s.args, &planes, &s.chunks[c], s.positions, i) != REF_NO)
+                        if (marked[id] || !place.known ||
+                            ref_shadow_test(&s.args, &planes, &s.chunks[c], s.positions, i) != REF_NO)
                             continue;
                         double x = floor(0.5 * (place.x.lo + place.x.hi)), y = floor(0.5 * (place.y.lo + place.y.hi));
                         x -= s.args.view.origin_x;
@@ -326,7 +327,7 @@ static void two_ways(struct harness *h)
                 for (uint32_t i = 0; i < s.chunks[c].count; i++) {
                     uint32_t id = s.chunks[c].first + i;
                     struct ref_place place = ref_place(&s.args.view, &s.chunks[c], s.positions, i);
-                    int is_lit = ref_lit(&s.args, &planes, &s.chunks[c], s.positions, i) == REF_NO;
+                    int is_lit = ref_shadow_test(&s.args, &planes, &s.chunks[c], s.positions, i) == REF_NO;
                     lit += (uint32_t)is_lit;
                     dark += (uint32_t)!is_lit;
                     if (place.known && is_lit != marked[id])

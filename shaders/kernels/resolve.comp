@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of native/device_cpu/kernels/surface.c
+// resolve: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of native/device_cpu/kernels/resolve.c
 //   NORMALS: whether the cloud has normals; SIGMAS: whether it was analysed; SPAN: whether that plane is written
 #version 430 core
 #include "shared/measured.h"
@@ -7,13 +7,13 @@
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
-layout(std430, binding = BIND_arguments) readonly buffer arguments_block { surface_args args; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { resolve_args args; };
 layout(location = 16) uniform float spacings[PT_SPACINGS]; // args.instance.spacing
 #ifdef PT_SOFTWARE // a texel takes half the time of a block's word; elsewhere blocks hold more
 #define WORD(i) read_word(i)
 #else
-layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
-#define WORD(i) surface[i]
+layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
+#define WORD(i) surfels[i]
 #endif
 layout(std430, binding = BIND_normal) writeonly buffer normals_block { vec4 normals[]; };
 layout(std430, binding = BIND_deff) writeonly buffer deff_block { float deff[]; };
@@ -31,7 +31,7 @@ struct instance_part {
     vec3 rows[3]; // of the normal matrix
 };
 
-void surface_pixel(view_args view, instance_part instance, uint x, uint y)
+void resolve_pixel(view_args view, instance_part instance, uint x, uint y)
 {
     uint at = y * view.width + x;
     // 1. the point
@@ -94,7 +94,7 @@ void main()
     if (left == 0u)
         return;
     do {
-        surface_pixel(view, instance, here.x, here.y);
+        resolve_pixel(view, instance, here.x, here.y);
         here += PT_STEP;
     } while (--left != 0u);
 }

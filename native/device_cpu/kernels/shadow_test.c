@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// lit: points against the filled map of a light. [D 6], SPEC 4; twin of shaders/kernels/lit.comp
+// shadow_test: points against the filled map of a light. [D 6], SPEC 4; twin of shaders/kernels/shadow_test.comp
 //
 // Words of a cloud's points belong to one chunk each, so threads never meet. Lit points are not written at all.
 #include "device_cpu/points.h"
-#include "lit_words.h"
+#include "shadow_words.h"
 #include "shared/shadows.h"
 
-struct lit {
+struct shadow_test {
     const struct pt_cpu_call *call;
-    struct lit_args args; // with the wider texel
+    struct shadow_test_args args; // with the wider texel
 };
 
 // Where PT_LANES points fall: z, pixel and texel, and which of them lie behind what the map shows there by more than their
@@ -28,10 +28,10 @@ struct queue {
 };
 
 // 1. project and compare.
-static struct fall fall_of(const struct lit *lit, const struct chunk_view *chunk, const vf p[3], vm lanes)
+static struct fall fall_of(const struct shadow_test *test, const struct chunk_view *chunk, const vf p[3], vm lanes)
 {
-    const struct view_args *view = &lit->args.view;
-    const float *window = lit->args.window;
+    const struct view_args *view = &test->args.view;
+    const float *window = test->args.window;
     vf at[3];
     pt_project(view, chunk, p, at);
     struct fall f = {.z = at[2], .at = {at[0], at[1]}};
@@ -41,9 +41,9 @@ static struct fall fall_of(const struct lit *lit, const struct chunk_view *chunk
     f.column = vi_sub(vf_int(vf_floor(f.at[0])), vi_set((uint32_t)view->origin_x));
     f.row = vi_sub(vf_int(vf_floor(f.at[1])), vi_set((uint32_t)view->origin_y));
     f.texel = vi_add(vi_mul(f.row, vi_set(view->width)), f.column);
-    f.map = vi_float(vi_gather_z(PT_DATA(lit->call, lit, keys), f.texel, inside));
+    f.map = vi_float(vi_gather_z(PT_DATA(test->call, shadow_test, keys), f.texel, inside));
     // no d_eff is less than that of a surface without spacing that faces the light; a thousandth off for rounding
-    vf least = vf_set(0.999f) * vf_layer_distance(view, lit->args.instance.d_min, vf_zero(), f.z, vf_set(1.0f));
+    vf least = vf_set(0.999f) * vf_layer_distance(view, test->args.instance.d_min, vf_zero(), f.z, vf_set(1.0f));
     f.behind = vm_and(inside, vf_lt(f.map + least, f.z));
     return f;
 }
@@ -104,11 +104,11 @@ static vm supported(const struct around *around, vf d, vf z, vm dark)
 }
 
 // 2. d_eff of those of PT_LANES points in this view. *none: those without a normal.
-static vf layer_distance(const struct lit *lit, const vf at[2], vf z, vi id, vm lanes, vm *none)
+static vf layer_distance(const struct shadow_test *test, const vf at[2], vf z, vi id, vm lanes, vm *none)
 {
-    const struct view_args *view = &lit->args.view;
-    const struct instance_args *instance = &lit->args.instance;
-    vi word = vi_gather(PT_DATA(lit->call, lit, surface), id, lanes);
+    const struct view_args *view = &test->args.view;
+    const struct instance_args *instance = &test->args.instance;
+    vi word = vi_gather(PT_DATA(test->call, shadow_test, surfels), id, lanes);
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT)), n[3];
     *none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
     if (!instance->has_normals)
@@ -126,21 +126,21 @@ static vf layer_distance(const struct lit *lit, const vf at[2], vf z, vi id, vm 
 }
 
 // Which of PT_LANES points are in shadow.
-static uint32_t in_shadow(const struct lit *lit, const struct fall *f, vi id)
+static uint32_t in_shadow(const struct shadow_test *test, const struct fall *f, vi id)
 {
     struct around around;
     vm none;
-    vf d = layer_distance(lit, f->at, f->z, id, f->behind, &none);
+    vf d = layer_distance(test, f->at, f->z, id, f->behind, &none);
     vm dark = vm_and(f->behind, vf_lt(f->map + d, f->z));
     if (!vm_bits(dark))
         return 0;
-    look_around(&lit->args.view, PT_DATA(lit->call, lit, keys), f->column, f->row, dark, &around);
+    look_around(&test->args.view, PT_DATA(test->call, shadow_test, keys), f->column, f->row, dark, &around);
     none = vm_and(none, dark);
     if (vm_bits(none)) {
-        vi source = pt_source_gather(PT_DATA(lit->call, lit, from), f->texel, none);
-        vf shown = vf_gather(PT_DATA(lit->call, lit, deff), source, none), last = vf_set(pt_float(PT_KEY_EMPTY_Z));
+        vi source = pt_source_gather(PT_DATA(test->call, shadow_test, from), f->texel, none);
+        vf shown = vf_gather(PT_DATA(test->call, shadow_test, deff), source, none), last = vf_set(pt_float(PT_KEY_EMPTY_Z));
         vf steep = vf_select(beside_nothing(&around, none), d * vf_set(PT_SHADOW_STEEP), d);
-        if (lit->args.view.perspective)
+        if (test->args.view.perspective)
             last = f->map + vf_set(PT_SHADOW_APART) * shown;
         d = vf_select(none, vf_max(steep, shown), d);
         dark = vm_and(dark, vf_lt(vf_select(none, farthest(&around, f->map, last), f->map) + d, f->z));
@@ -149,13 +149,13 @@ static uint32_t in_shadow(const struct lit *lit, const struct fall *f, vi id)
 }
 
 // 3. what the map takes of 255 from a point in the shadow of a texel.
-static inline uint32_t loss_at(const struct lit *lit, uint32_t texel)
+static inline uint32_t loss_at(const struct shadow_test *test, uint32_t texel)
 {
-    if (!lit->args.faint)
-        return lit->args.loss;
-    const uint32_t *keys = PT_DATA(lit->call, lit, keys); // low words: ids
-    const uint8_t *opacities = PT_DATA(lit->call, lit, opacities);
-    return pt_shadow_share(lit->args.loss, opacities[keys[2 * (size_t)texel] - lit->args.caster]);
+    if (!test->args.faint)
+        return test->args.loss;
+    const uint32_t *keys = PT_DATA(test->call, shadow_test, keys); // low words: ids
+    const uint8_t *opacities = PT_DATA(test->call, shadow_test, opacities);
+    return pt_shadow_share(test->args.loss, opacities[keys[2 * (size_t)texel] - test->args.caster]);
 }
 
 // Queues the points of PT_LANES slots from i on that `lanes` names.
@@ -187,11 +187,11 @@ static struct fall queued(const struct queue *queue, uint32_t i, vm lanes)
 }
 
 // Queues those of BLOCK slots from `first` on that have to be tested, or looked at in any case.
-static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, const float *positions, uint32_t first,
+static void fill_queue(const struct shadow_test *test, const struct chunk_view *chunk, const float *positions, uint32_t first,
                        struct queue *queue)
 {
-    const struct lit_args *args = &lit->args;
-    const uint8_t *marks = PT_DATA(lit->call, lit, marks); // none where none are asked for
+    const struct shadow_test_args *args = &test->args;
+    const uint8_t *marks = PT_DATA(test->call, shadow_test, marks); // none where none are asked for
     const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
     queue->count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
@@ -205,7 +205,7 @@ static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, co
             continue;
         vf p[3];
         pt_load_points(positions, chunk->padded, i, p);
-        const struct fall fall = fall_of(lit, chunk, p, lanes);
+        const struct fall fall = fall_of(test, chunk, p, lanes);
         const uint32_t wanted = vm_bits(args->close || args->compare ? lanes : fall.behind); // lit ones too, to look at
         if (wanted)
             enqueue(queue, i, &fall, wanted);
@@ -213,53 +213,54 @@ static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, co
 }
 
 // Tests PT_LANES queued points from `at` on.
-static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk, const struct queue *queue, uint32_t at)
+static uint32_t test_points(const struct shadow_test *test, const struct chunk_view *chunk, const struct queue *queue,
+                            uint32_t at)
 {
-    const struct lit_args *args = &lit->args;
-    uint32_t *words = (uint32_t *)PT_DATA(lit->call, lit, shadows) + args->base + chunk->first, differs = 0;
+    const struct shadow_test_args *args = &test->args;
+    uint32_t *words = (uint32_t *)PT_DATA(test->call, shadow_test, shadows) + args->base + chunk->first, differs = 0;
     const vm lanes = vm_first(pt_lanes_left(at, queue->count));
     const struct fall fall = queued(queue, at, lanes);
     const vi id = vi_add(vi_load(queue->slot + at), vi_set(chunk->first));
-    const uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(lit, &fall, id) : 0;
+    const uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(test, &fall, id) : 0;
     for (uint32_t left = args->close || args->compare ? vm_bits(lanes) : shadowed; left; left &= left - 1) {
         const uint32_t k = (uint32_t)__builtin_ctz(left);
         // 4. what the sample takes goes into the word
-        differs |= pt_shadow_note(words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(lit, queue->texel[at + k]) : 0,
+        differs |= pt_shadow_note(words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(test, queue->texel[at + k]) : 0,
                                   args->alone || args->close, args->samples);
     }
     return differs;
 }
 
-static uint32_t lit_chunk(const struct lit *lit, const struct chunk_view *chunk)
+static uint32_t test_chunk(const struct shadow_test *test, const struct chunk_view *chunk)
 {
-    const float *positions = (const float *)PT_DATA(lit->call, lit, positions) + 3 * (size_t)chunk->first;
+    const float *positions = (const float *)PT_DATA(test->call, shadow_test, positions) + 3 * (size_t)chunk->first;
     uint32_t differs = 0;
     struct queue queue;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
-        fill_queue(lit, chunk, positions, first, &queue);
+        fill_queue(test, chunk, positions, first, &queue);
         for (uint32_t at = 0; at < queue.count; at += PT_LANES)
-            differs |= lit_points(lit, chunk, &queue, at);
+            differs |= test_points(test, chunk, &queue, at);
     }
     return differs;
 }
 
-static void lit_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+static void test_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
-    const struct lit *lit = context;
-    const struct chunk_view *chunks = PT_DATA(lit->call, lit, chunks);
+    const struct shadow_test *test = context;
+    const struct chunk_view *chunks = PT_DATA(test->call, shadow_test, chunks);
     uint32_t differs = 0;
     (void)thread;
-    for (uint32_t c = begin; c < end && !pt_cpu_cancelled(lit->call); c++)
-        differs |= lit_chunk(lit, &chunks[c]);
-    if (differs && lit->args.compare)
-        __atomic_store_n((uint32_t *)PT_DATA(lit->call, lit, differs), 1, __ATOMIC_RELAXED);
+    for (uint32_t c = begin; c < end && !pt_cpu_cancelled(test->call); c++)
+        differs |= test_chunk(test, &chunks[c]);
+    if (differs && test->args.compare)
+        __atomic_store_n((uint32_t *)PT_DATA(test->call, shadow_test, differs), 1, __ATOMIC_RELAXED);
 }
 
-int PT_KERNEL_ENTRY(lit)(const struct pt_cpu_call *call)
+int PT_KERNEL_ENTRY(shadow_test)(const struct pt_cpu_call *call)
 {
-    struct lit lit = {call, *(const struct lit_args *)call->arguments};
-    lit.args.view.footprint = lit.args.view.footprint * PT_TEXEL_SLACK;
-    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_lit_chunks]->size / sizeof(struct chunk_view)), 4, lit_chunks,
-                &lit);
+    struct shadow_test test = {call, *(const struct shadow_test_args *)call->arguments};
+    test.args.view.footprint = test.args.view.footprint * PT_TEXEL_SLACK;
+    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_shadow_test_chunks]->size / sizeof(struct chunk_view)), 4,
+                test_chunks, &test);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

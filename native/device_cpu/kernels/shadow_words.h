@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Shadow words: what a sample's maps take of a point's light, for the kernels that test points.
-#ifndef PT_LIT_WORDS_H
-#define PT_LIT_WORDS_H
+#ifndef PT_SHADOW_WORDS_H
+#define PT_SHADOW_WORDS_H
 
 #include "device_cpu/rows.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// surface: normals in view space, 1 / max(|n.v|, C), d_eff.
+// resolve: normals in view space, 1 / max(|n.v|, C), d_eff.
 #include "harness.h"
 #include "shared/measured.h"
 
@@ -7,9 +7,9 @@
 #include <string.h>
 
 // Two instances share the picture: the lower half of the ids is tested, the upper must stay untouched.
-static struct surface_args arguments(const struct picture *picture, struct rng *rng)
+static struct resolve_args arguments(const struct picture *picture, struct rng *rng)
 {
-    struct surface_args args = {.view = picture->view};
+    struct resolve_args args = {.view = picture->view};
     args.instance.id_base = picture->id_base;
     args.instance.id_count = (uint32_t)(picture->count * 3 / 4);
     args.instance.has_normals = 1;
@@ -38,7 +38,7 @@ static void compare(struct harness *h, const char *label, int x, int y, double g
 }
 
 // shapes: NULL where the cloud was not analysed.
-static void check_shapes(struct harness *h, const struct picture *picture, const struct surface_args *args,
+static void check_shapes(struct harness *h, const struct picture *picture, const struct resolve_args *args,
                          const uint32_t *words, const uint32_t *shapes, const float *estimate)
 {
     size_t count = picture->count;
@@ -55,7 +55,7 @@ static void check_shapes(struct harness *h, const struct picture *picture, const
     struct pt_buffer *from_buffer = harness_buffer(h, from, count * 4);
     struct pt_buffer *shapes_buffer = harness_buffer(h, shapes ? shapes : words, (size_t)args->instance.id_count * 4);
     struct pt_buffer *span_buffer = harness_buffer(h, span, count * 4);
-    HARNESS_RUN(h, surface, args, keys_buffer, words_buffer, normal_buffer, deff_buffer, from_buffer, shapes_buffer,
+    HARNESS_RUN(h, resolve, args, keys_buffer, words_buffer, normal_buffer, deff_buffer, from_buffer, shapes_buffer,
                 span_buffer);
     const float *got_normal = harness_read(h, normal_buffer), *got_deff = harness_read(h, deff_buffer);
     const float *got_span = harness_read(h, span_buffer);
@@ -66,7 +66,7 @@ static void check_shapes(struct harness *h, const struct picture *picture, const
     harness_same(h, "from", got_from, count, 4, 1, width);
     harness_same(h, "span", got_span, count, 4, 1, width);
 
-    struct ref_planes planes = {.keys = picture->keys, .normal = estimate, .surface = words, .shapes = shapes};
+    struct ref_planes planes = {.keys = picture->keys, .normal = estimate, .surfels = words, .shapes = shapes};
     const uint32_t *rect = args->view.rect;
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % width), y = (int)(i / width);
@@ -77,7 +77,7 @@ static void check_shapes(struct harness *h, const struct picture *picture, const
                 harness_fail(h, "untouched", x, y, "was written: d_eff %g, from %u", got_deff[i], got_from[i]);
             continue;
         }
-        struct ref_surface expected = ref_surface(args, &planes, x, y);
+        struct ref_resolve expected = ref_resolve(args, &planes, x, y);
         compare(h, "normal.x", x, y, got_normal[4 * i], expected.n.x, expected.normal_error);
         compare(h, "normal.y", x, y, got_normal[4 * i + 1], expected.n.y, expected.normal_error);
         compare(h, "normal.z", x, y, got_normal[4 * i + 2], expected.n.z, expected.normal_error);
@@ -92,7 +92,7 @@ static void check_shapes(struct harness *h, const struct picture *picture, const
     }
 }
 
-static void check(struct harness *h, const struct picture *picture, const struct surface_args *args, const uint32_t *words,
+static void check(struct harness *h, const struct picture *picture, const struct resolve_args *args, const uint32_t *words,
                   const float *estimate)
 {
     check_shapes(h, picture, args, words, NULL, estimate);
@@ -106,7 +106,7 @@ static void random_normals(struct harness *h)
         for (size_t s = 0; s < sizeof shapes / sizeof shapes[0]; s++) {
             struct picture picture = picture_random(h, &rng, picture_view(shapes[s][0], shapes[s][1], p),
                                                     s % 2 ? PICTURE_RANGE : PICTURE_SURFACES, 0.8);
-            struct surface_args args = arguments(&picture, &rng);
+            struct resolve_args args = arguments(&picture, &rng);
             check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 0), picture.normal);
         }
 }
@@ -117,7 +117,7 @@ static void estimated(struct harness *h)
     struct rng rng = {2};
     for (int p = 0; p < 2; p++) {
         struct picture picture = picture_random(h, &rng, picture_view(67, 45, p), PICTURE_NOISE, 0.7);
-        struct surface_args args = arguments(&picture, &rng);
+        struct resolve_args args = arguments(&picture, &rng);
         args.instance.has_normals = 0;
         for (size_t i = 0; i < picture.count; i++) {
             picture.normal[4 * i + 3] = 0.0f;
@@ -143,7 +143,7 @@ static void matrices(struct harness *h)
     for (int p = 0; p < 2; p++)
         for (size_t s = 0; s < sizeof special / sizeof special[0]; s++) {
             struct picture picture = picture_random(h, &rng, picture_view(35, 17, p), PICTURE_SURFACES, 0.9);
-            struct surface_args args = arguments(&picture, &rng);
+            struct resolve_args args = arguments(&picture, &rng);
             memcpy(args.instance.normal_matrix, special[s], sizeof special[s]);
             check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 0), picture.normal);
         }
@@ -158,7 +158,7 @@ static void distances(struct harness *h)
         for (size_t s = 0; s < 4; s++) {
             struct picture picture = picture_random(h, &rng, picture_view(35, 17, p), PICTURE_RANGE, 0.9);
             picture.view.footprint = s == 1 ? 1e-12f : picture.view.footprint; // leaves 4 ulp to decide
-            struct surface_args args = arguments(&picture, &rng);
+            struct resolve_args args = arguments(&picture, &rng);
             args.instance.d_min = d_min[s];
             for (int i = 0; i < PT_SPACINGS; i++)
                 args.instance.spacing[i] = s == 1 && i % 2 ? 0.0f : args.instance.spacing[i];
@@ -173,7 +173,7 @@ static void sigmas(struct harness *h)
     for (int p = 0; p < 2; p++)
         for (int spans = 0; spans < 2; spans++) {
             struct picture picture = picture_random(h, &rng, picture_view(67, 45, p), PICTURE_SURFACES, 0.9);
-            struct surface_args args = arguments(&picture, &rng);
+            struct resolve_args args = arguments(&picture, &rng);
             args.instance.has_normals = (uint32_t)spans;
             args.sigma_scale = 0.0625f;
             args.with_span = (uint32_t)spans;
@@ -188,7 +188,7 @@ static void rectangle(struct harness *h)
 {
     struct rng rng = {5};
     struct picture picture = picture_random(h, &rng, picture_view(67, 45, 1), PICTURE_SURFACES, 0.9);
-    struct surface_args args = arguments(&picture, &rng);
+    struct resolve_args args = arguments(&picture, &rng);
     const uint32_t rect[4] = {5, 7, 38, 40};
     memcpy(args.view.rect, rect, sizeof rect);
     check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 0), picture.normal);
@@ -216,21 +216,21 @@ static void sanity(struct harness *h)
     uint64_t key = ref_key(8.0f, 3);
     float normal[4] = {(float)sqrt(0.75), 0.0f, 0.5f, 0.0f};
     uint32_t words[4] = {0, 0, 0, PT_NORMAL_NONE | 1u << 26};
-    struct surface_args args = {.view = {.width = 1, .height = 1, .footprint = 0.25f}};
+    struct resolve_args args = {.view = {.width = 1, .height = 1, .footprint = 0.25f}};
     args.instance.id_count = 4;
     args.instance.spacing[1] = 0.5f; // twice that is the greatest
-    struct ref_planes planes = {.keys = &key, .normal = normal, .surface = words};
-    struct ref_surface out = ref_surface(&args, &planes, 0, 0);
+    struct ref_planes planes = {.keys = &key, .normal = normal, .surfels = words};
+    struct ref_resolve out = ref_resolve(&args, &planes, 0, 0);
     HARNESS_CHECK(h, fabs(out.inverse - 2.0) < 1e-6 && fabs(out.deff - 2.0) < 1e-6);
     const uint32_t thin[4] = {0, 0, 0, 1u << PT_SHAPE_SIGMA_SHIFT}; // a sigma of 0.01: 0.7 spacings decide
     planes.shapes = thin;
     args.sigma_scale = 0.02f;
-    out = ref_surface(&args, &planes, 0, 0);
+    out = ref_resolve(&args, &planes, 0, 0);
     HARNESS_CHECK(h, fabs(out.deff - 0.7) < 1e-6 && fabs(out.span - 2.0) < 1e-6);
     args.sigma_scale = 0.4f; // 0.2: four of it
-    HARNESS_CHECK(h, fabs(ref_surface(&args, &planes, 0, 0).deff - 1.6) < 1e-6);
+    HARNESS_CHECK(h, fabs(ref_resolve(&args, &planes, 0, 0).deff - 1.6) < 1e-6);
     args.sigma_scale = 4.0f; // no more than two spacings
-    HARNESS_CHECK(h, fabs(ref_surface(&args, &planes, 0, 0).deff - 2.0) < 1e-6);
+    HARNESS_CHECK(h, fabs(ref_resolve(&args, &planes, 0, 0).deff - 2.0) < 1e-6);
 }
 
 int main(int argc, char **argv)

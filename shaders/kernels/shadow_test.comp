@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// lit: points against the filled map of a light. [D 6], SPEC 4; twin of native/device_cpu/kernels/lit.c
+// shadow_test: points against the filled map of a light. [D 6], SPEC 4; twin of native/device_cpu/kernels/shadow_test.c
 //
 // A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). A word belongs to one point, so invocations never meet.
 #version 430 core
@@ -11,10 +11,10 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = BIND_arguments) readonly buffer arguments_block { lit_args args; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { shadow_test_args args; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_marks) readonly buffer marks_block { uint marks[]; };
 layout(std430, binding = BIND_shadows) buffer shadows_block { uint words[]; };
 layout(std430, binding = BIND_differs) buffer differs_block { uint differs[]; };
@@ -66,7 +66,7 @@ bool supported(view_args view, int column, int row, float d, float z)
 // 2. d_eff of the point in this view; ray: where it falls.
 float layer_distance(view_args view, vec2 ray, float z, uint id, out bool none)
 {
-    uint word = surface[id];
+    uint word = surfels[id];
     vec3 object = pt_decode_normal(word), n;
     for (int k = 0; k < 3; k++)
         n[k] = pt_dot(vec3(args.instance.normal_matrix[3 * k], args.instance.normal_matrix[3 * k + 1],

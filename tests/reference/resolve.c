@@ -17,16 +17,16 @@ static struct ref_vec transform(const float m[9], struct ref_vec n, double *term
     return out;
 }
 
-struct ref_surface ref_surface(const struct surface_args *args, const struct ref_planes *planes, int x, int y)
+struct ref_resolve ref_resolve(const struct resolve_args *args, const struct ref_planes *planes, int x, int y)
 {
     const struct view_args *view = &args->view;
     const struct instance_args *instance = &args->instance;
     size_t pixel = (size_t)y * view->width + (size_t)x;
     uint64_t key = planes->keys[pixel];
-    uint32_t word = planes->surface[ref_key_id(key) - instance->id_base];
+    uint32_t word = planes->surfels[ref_key_id(key) - instance->id_base];
     double z = ref_key_z(key);
     struct ref_vec viewer = ref_viewer(view, ref_ray(view, x, y)), n = {0.0, 0.0, 0.0};
-    struct ref_surface out = {.from = (uint32_t)pixel, .normal_error = TOL_NORMAL};
+    struct ref_resolve out = {.from = (uint32_t)pixel, .normal_error = TOL_NORMAL};
     int has = 0;
     if (!instance->has_normals) {
         n = ref_unit(ref_vec_of(planes->normal + 4 * pixel));

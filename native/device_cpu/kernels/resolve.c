@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of shaders/kernels/surface.comp
+// resolve: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of shaders/kernels/resolve.comp
 #include "device_cpu/cpu.h"
 #include "device_cpu/rows.h"
 #include "device_cpu/vector_math.h"
@@ -15,15 +15,15 @@ struct measured {
 };
 
 // count <= PT_LANES pixels from the i-th on.
-static void surface_pixels(const struct surface_args *args, const struct pt_cpu_call *call, uint32_t y,
+static void resolve_pixels(const struct resolve_args *args, const struct pt_cpu_call *call, uint32_t y,
                            const struct measured *measured, uint32_t i, uint32_t count)
 {
     const struct view_args *view = &args->view;
     const struct instance_args *instance = &args->instance;
     const uint32_t *x = measured->x + i;
     const size_t row = (size_t)y * view->width;
-    float *normals = (float *)PT_DATA(call, surface, normal) + 4 * row, *deff = (float *)PT_DATA(call, surface, deff) + row;
-    float *span = args->with_span ? (float *)PT_DATA(call, surface, span) + row : NULL;
+    float *normals = (float *)PT_DATA(call, resolve, normal) + 4 * row, *deff = (float *)PT_DATA(call, resolve, deff) + row;
+    float *span = args->with_span ? (float *)PT_DATA(call, resolve, span) + row : NULL;
     const vm some = vm_first(count);
     const vf one = vf_set(1.0f);
 
@@ -79,16 +79,16 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     }
 }
 
-static void surface_row(void *context, uint32_t y)
+static void resolve_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
-    const struct surface_args *args = call->arguments;
+    const struct resolve_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
     const size_t row = (size_t)y * args->view.width;
-    const uint64_t *keys = (const uint64_t *)PT_DATA(call, surface, keys) + row;
-    uint32_t *from = (uint32_t *)PT_DATA(call, surface, from) + row;
-    const uint32_t *words = PT_DATA(call, surface, surface),
-                   *shapes = args->sigma_scale > 0.0f ? PT_DATA(call, surface, shapes) : NULL;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(call, resolve, keys) + row;
+    uint32_t *from = (uint32_t *)PT_DATA(call, resolve, from) + row;
+    const uint32_t *words = PT_DATA(call, resolve, surfels),
+                   *shapes = args->sigma_scale > 0.0f ? PT_DATA(call, resolve, shapes) : NULL;
     struct measured measured;
     for (uint32_t first = rect[0]; first < rect[2]; first += BLOCK) {
         const uint32_t end = rect[2] - first < BLOCK ? rect[2] : first + BLOCK;
@@ -112,12 +112,12 @@ static void surface_row(void *context, uint32_t y)
         for (uint32_t i = 0; i < count; i++)
             measured.word[i] = words[measured.word[i]];
         for (uint32_t i = 0; i < count; i += PT_LANES)
-            surface_pixels(args, call, y, &measured, i, pt_lanes_left(i, count));
+            resolve_pixels(args, call, y, &measured, i, pt_lanes_left(i, count));
     }
 }
 
-int PT_KERNEL_ENTRY(surface)(const struct pt_cpu_call *call)
+int PT_KERNEL_ENTRY(resolve)(const struct pt_cpu_call *call)
 {
-    const struct surface_args *args = call->arguments;
-    return pt_rows(call, &args->view, surface_row);
+    const struct resolve_args *args = call->arguments;
+    return pt_rows(call, &args->view, resolve_row);
 }
