@@ -50,14 +50,22 @@ static size_t check(struct harness *h, const struct picture *picture, const stru
     uint32_t *got_nearest = harness_read(h, nearest);
     struct ref_planes planes = picture_planes(picture);
     planes.through = through;
+    const int whole = view->rect[2] - view->rect[0] == view->width && view->rect[3] - view->rect[1] == view->height;
+    if (whole) {
+        harness_same(h, "line", got, count, 4, 1, view->width);
+        for (size_t i = 0; i < count; i++)
+            if (got[i] == 0.0f)
+                got_nearest[i] = 0; // undefined there
+        harness_same(h, "nearest", got_nearest, count, 4, 1, view->width);
+    }
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % view->width), y = (int)(i / view->width);
         if (x < (int)view->rect[0] || y < (int)view->rect[1] || x >= (int)view->rect[2] || y >= (int)view->rect[3])
             continue;
-        struct ref_line expected = ref_lines(&args, &planes, limit, x, y);
         lines += got[i] > 0.0f;
-        if (got[i] == 0.0f)
-            got_nearest[i] = 0; // undefined there
+        if (whole && harness_settled(h))
+            continue;
+        struct ref_line expected = ref_lines(&args, &planes, limit, x, y);
         open += (size_t)expected.unsure;
         if (expected.unsure)
             continue;
@@ -67,10 +75,6 @@ static size_t check(struct harness *h, const struct picture *picture, const stru
             harness_fail(h, "nearest", x, y, "got %u, expected %u", got_nearest[i], expected.nearest);
     }
     harness_unsure(h, open, count, share);
-    if (view->rect[2] - view->rect[0] == view->width && view->rect[3] - view->rect[1] == view->height) {
-        harness_same(h, "line", got, count, 4, 1, view->width);
-        harness_same(h, "nearest", got_nearest, count, 4, 1, view->width);
-    }
     return lines;
 }
 

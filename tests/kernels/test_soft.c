@@ -251,6 +251,20 @@ static double densest(const struct setup *s)
     return most;
 }
 
+// Of every pixel. It takes longer than all devices together, so the first one's serves the others.
+static const struct ref_soft *reference(struct harness *h, const struct setup *s, const float *reached)
+{
+    const struct ref_soft *kept = harness_kept(h);
+    if (kept)
+        return kept;
+    struct ref_soft *out = harness_alloc(h, s->pixels * sizeof *out);
+    for (size_t i = 0; i < s->pixels; i++)
+        out[i] = ref_soft(&s->args, s->records, (int)(i % s->args.view.width), (int)(i / s->args.view.width), (double)reached[i],
+                          ref_key_z(s->keys[i]));
+    harness_keep(h, out, s->pixels * sizeof *out);
+    return out;
+}
+
 static void run(struct harness *h, struct setup *s, enum check check)
 {
     const uint32_t width = s->args.view.width;
@@ -273,10 +287,11 @@ static void run(struct harness *h, struct setup *s, enum check check)
     double worst = 0.0;
     if (check == ALPHA)
         check_alpha(h, s, got, target);
-    for (size_t i = 0; i < s->pixels && check == EVERYTHING; i++) {
+    const struct ref_soft *all = check == EVERYTHING ? reference(h, s, reached) : NULL;
+    for (size_t i = 0; i < s->pixels && all; i++) {
         const int x = (int)(i % width), y = (int)(i / width);
         const double z = ref_key_z(s->keys[i]);
-        const struct ref_soft expected = ref_soft(&s->args, s->records, x, y, (double)reached[i], z);
+        const struct ref_soft expected = all[i];
         const double alpha = 1.0 - expected.through, left = 1.0 - (double)target[4 * i + 3];
         for (int k = 0; k < 4; k++) {
             const double own = k < 3 ? expected.color[k] : alpha, old = (double)target[4 * i + k];
