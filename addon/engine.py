@@ -157,7 +157,8 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         lost = [losses.Loss(f"'{item.name}': {item.cloud.stream.message}") for item in description.clouds
                 if item.cloud.stream and item.cloud.stream.message]
         losses.check(lost)
-        return replace(description, notices=[*description.notices, *lost]), picture
+        told = [f"'{item.name}': {text}" for item in description.clouds if item.cloud.stream for text in item.cloud.stream.notes]
+        return replace(description, notices=[*description.notices, *told, *lost]), picture
 
     def _go_to(self, frame: float) -> None:
         self.frame_set(math.floor(frame), frame - math.floor(frame))

@@ -14,6 +14,7 @@ from .properties.automatic import switch
 
 GIGA = 1 << 30
 CACHE_GIGA = 32  # of clouds on the disk, 23 bytes a point: a sequence has many
+PAGES_GIGA = 8  # of fetched parts of files, some 10 bytes a point
 
 
 def get() -> PatinaPreferences | None:
@@ -52,6 +53,19 @@ class PatinaPreferences(AddonPreferences):
     cache_limit: IntProperty(
         name="Cache Size", default=CACHE_GIGA, min=1, soft_max=1024, max=1 << 20,
         description="Gigabytes that kept clouds may take; those not used for longest go first")
+    keep_pages: EnumProperty(
+        name="Keep Fetched Points", default='OFF',
+        description="Keep on this disk what pictures fetch of COPC files and EPT folders, as it came, so that it is fetched once",
+        items=(
+            ('OFF', "Off", "Each session fetches anew what it shows", 0),
+            ('ADDRESSES', "Of Addresses", "What comes from servers is kept", 1),
+            ('ALL', "Of Addresses and Files", "What is read of linked files as it is wanted, too: for slow shares", 2)))
+    pages_folder: StringProperty(
+        name="Folder", subtype='DIR_PATH',
+        description="Where fetched points are kept. Empty: a folder among the caches")
+    pages_limit: IntProperty(
+        name="Size", default=PAGES_GIGA, min=1, soft_max=1024, max=1 << 20,
+        description="Gigabytes that fetched points may take; those not used for longest go first")
     device: EnumProperty(
         name="Device", default='AUTO', description="What computes the pictures of scenes whose own device is Automatic",
         items=(
@@ -88,6 +102,16 @@ class PatinaPreferences(AddonPreferences):
         row = column.row()
         row.label(text=operators.cache_text())
         row.operator("patina.clear_cache")
+        column = layout.column()
+        column.prop(self, "keep_pages")
+        count, size = operators.pages_held()
+        if self.keep_pages != 'OFF':
+            column.prop(self, "pages_folder")
+            column.prop(self, "pages_limit", text="Size (GB)")
+        if self.keep_pages != 'OFF' or count:
+            row = column.row()
+            row.label(text=f"{count:,} parts of files kept")
+            row.operator("patina.clear_pages", text=f"Clear {size / 1e9:.2f} GB")
         column = layout.column()
         column.label(text="Defaults")
         column.prop(self, "device")

@@ -268,7 +268,7 @@ class Viewport:
         streams = self._streams()
         coming = [stream.outlook() for stream in streams]
         points, size = sum(one.points for one in coming), sum(one.megabytes for one in coming)
-        said = next((f". {stream.message}" for stream in streams if stream.message), "")
+        said = next((f". {text}" for stream in streams for text in [stream.message, *stream.notes] if text), "")
         return (f", {points:,} points on their way ({size:,.1f} MB)" if points else "") + said
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
@@ -359,8 +359,9 @@ class Viewport:
         streams, news = self._streams(), False
         for stream in streams:
             news |= stream.advance()
-            if stream.message and stream.message not in self.notices:
-                self.notices = [*self.notices, stream.message]
+            new = [text for text in [*stream.notes, stream.message] if text and text not in self.notices]
+            if new:
+                self.notices = [*self.notices, *new]
                 self._news = True
         self._fresh |= news
         busy, now = any(stream.busy for stream in streams), time.monotonic()

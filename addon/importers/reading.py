@@ -166,8 +166,8 @@ def told(text: object) -> str:
 
 
 def name_of(path: Path) -> str:
-    """A file's name without its ending, which may be double."""
-    return path.stem.removesuffix(".copc")
+    """A file's name without its ending, which may be double; of an EPT's ept.json its folder's."""
+    return path.parent.name if path.name.lower() == "ept.json" else path.stem.removesuffix(".copc")
 
 
 def crs_notes(units: Units | None) -> dict[str, list[float]]:

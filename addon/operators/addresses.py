@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clouds at addresses: COPC on a server, of which pictures fetch the points that they show."""
+"""Clouds at addresses: COPC and EPT on a server, of which pictures fetch the points that they show."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .steps import Stepped
 
 
 class PATINA_OT_import_address(Stepped, Operator):
-    """Show a COPC that lies on a server: pictures fetch the points that they show, nothing else is loaded"""
+    """Show a COPC or an EPT that lies on a server: pictures fetch the points that they show, nothing else is loaded"""
 
     bl_idname = "import_scene.patina_address"
     bl_label = "Open Point Cloud Address"
     bl_options = {'REGISTER', 'UNDO'}
 
-    address: StringProperty(name="Address", description="Of a COPC file (.copc.laz), beginning with https:// or http://",
+    address: StringProperty(name="Address", description="Of a COPC file (.copc.laz) or of an EPT's ept.json, beginning with https:// or http://",
                             options={'SKIP_SAVE'})
 
     def invoke(self, context: Context, _event: bpy.types.Event) -> set[str]:
@@ -76,7 +76,7 @@ class PATINA_OT_open_address(Operator):
 
 
 def _menu(self: bpy.types.Menu, _context: Context) -> None:
-    self.layout.operator(PATINA_OT_import_address.bl_idname, text="Point Cloud from Address (COPC)...")
+    self.layout.operator(PATINA_OT_import_address.bl_idname, text="Point Cloud from Address (COPC, EPT)...")
 
 
 _CLASSES = (PATINA_OT_import_address, PATINA_OT_open_address)

@@ -24,13 +24,13 @@ _previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked
 
 
 class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
-    """Import point files with colors, normals and scalars: PLY, LAS, LAZ, COPC, E57, PTX, PTS, XYZ, CSV, PCD, conf"""
+    """Import point files with colors, normals and scalars: PLY, LAS, LAZ, COPC, E57, PTX, PTS, XYZ, CSV, PCD, conf; link EPT"""
 
     bl_idname = "import_scene.patina_points"
     bl_label = "Import Points"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
-    filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in importers.FORMATS), options={'HIDDEN'})
+    filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in [*importers.FORMATS, "ept.json"]), options={'HIDDEN'})
     files: CollectionProperty(type=OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
     origin: EnumProperty(
@@ -192,11 +192,12 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
                 continue
             try:
                 spared = context.engine == set_up.PatinaRenderEngine.bl_idname and context.scene.patina.surface == 'RANGES'
-                streamed = name == first and self.stream != 'OFF' and addresses.is_streamed(first, self.stream)
+                streamed = name == first and addresses.is_streamed(first, self.stream)
                 source = linked.source(first, analyzed=name == first and not spared, streamed=streamed)  # of a sequence none is
                 if source is None:
                     raise native.PatinaError("there is no such file")
-                importers.reader(first)
+                if not streamed:
+                    importers.reader(first)
                 found[name] = yield from linked.steps(source, self._progress.part(index, len(paths)))
                 clouds.CACHE.keep_streamed(source, found[name].cloud)
             except native.PatinaCancelled:

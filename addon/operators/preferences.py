@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from ..sync import cache, clouds
 from .steps import Stepped
 
 PIP: list[str] | None = None  # in place of this Python's own
+LOOK = 3.0  # seconds between two looks at how much is kept
+
+_looked: list[tuple[float, tuple[int, int]]] = []  # when last, and what was there
 
 
 class _Installing(Stepped):
@@ -109,6 +113,20 @@ class PATINA_OT_clear_cache(Operator):
         return {'FINISHED'}
 
 
+class PATINA_OT_clear_pages(Operator):
+    """Delete what was fetched of addresses and slow shares and is kept on this disk. It is fetched anew when it is shown"""
+
+    bl_idname = "patina.clear_pages"
+    bl_label = "Clear Fetched Points"
+    bl_options = {'REGISTER', 'INTERNAL'}
+
+    def execute(self, _context: Context) -> set[str]:
+        count, size = cache.clear_pages()
+        _looked.clear()
+        self.report({'INFO'}, f"Deleted {count:,} part{'s' * (count != 1)} of files, {size / 1e9:.2f} GB")
+        return {'FINISHED'}
+
+
 class PATINA_OT_open_manual(Operator):
     """Open what tells how to use Patina"""
 
@@ -136,12 +154,19 @@ def cache_text() -> str:
     return f"{count} kept, {size / 1e9:.2f} GB"
 
 
+def pages_held() -> tuple[int, int]:
+    """Parts of files that are kept, and their bytes; looked up now and then, for panels are drawn often."""
+    if not _looked or time.monotonic() - _looked[0][0] > LOOK:
+        _looked[:] = [(time.monotonic(), cache.pages_held())]
+    return _looked[0][1]
+
+
 def draw_help(menu: bpy.types.Menu, _context: Context) -> None:
     menu.layout.separator()
     menu.layout.operator("patina.open_manual", text="Patina Manual", icon='HELP')
 
 
-_CLASSES = (PATINA_OT_install_readers, PATINA_OT_install_reader_files, PATINA_OT_clear_cache, PATINA_OT_open_manual)
+_CLASSES = (PATINA_OT_install_readers, PATINA_OT_install_reader_files, PATINA_OT_clear_cache, PATINA_OT_clear_pages, PATINA_OT_open_manual)
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(_CLASSES)
 

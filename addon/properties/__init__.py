@@ -303,7 +303,7 @@ class PatinaObjectProperties(PropertyGroup):
         name="Linked File", subtype='FILE_PATH', options=_PATH, get=_linked_file, set=_link_file,
         description="Point file that is drawn in place of the object's own vertices; its points never become Blender's. "
                     "Number signs in its name stand for digits: scan_####.ply shows a file a frame")
-    address: StringProperty(name="Address", override=_OVERRIDE, options={'HIDDEN'}, description="Of a COPC on a server, in place of a file")
+    address: StringProperty(name="Address", override=_OVERRIDE, options={'HIDDEN'}, description="Of a COPC or an EPT on a server, in place of a file")
     stream: EnumProperty(
         name="Read", override=_OVERRIDE, default='AUTO',
         description="When a linked COPC is read. As needed: at once seen, without conversion, analysis or stations; a picture fetches "

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""COPC without conversion: clouds whose pages are read as pictures want them. reader.py reads, in a process of its own; here its pages are
+"""COPC and EPT without conversion: clouds whose pages are read as pictures want them. reader.py reads, in a process of its own; here its pages are
 looked for and handed to the library, without waiting. Knows no Blender.
 
-copc.py, source.py and reader.py are that process's and import nothing of the add-on's.
+copc.py, ept.py, source.py, kept.py and reader.py are that process's and import nothing of the add-on's.
 """
 
 from __future__ import annotations
@@ -42,15 +42,25 @@ class Outlook:
     megabytes: float  # as they lie in the file
 
 
+@dataclass(frozen=True)
+class Keep:
+    """Where what is read is kept, and how many bytes all of it may take."""
+
+    folder: Path
+    bytes: int
+
+
 class Stream:
     """The pages of one cloud. One call at a time."""
 
-    def __init__(self, place: str, scalar: str = "") -> None:
+    def __init__(self, place: str, scalar: str = "", keep: Keep | None = None, offline: str = "") -> None:
+        """offline: why nothing may be fetched; then what is kept is all there is."""
         self.place = place
         self._cloud: weakref.ref[native.Cloud] | None = None  # which keeps this one
         self.origin = (0.0, 0.0, 0.0)
         self.wkt = ""
         self.message = ""  # what went wrong last, with the address and the page
+        self.notes: list[str] = []  # what the artist should know beside, with the address: nothing lacks for it
         self.arrived = 0  # pages so far
         self.has_scalar = False
         self._lock = threading.RLock()  # a final picture's thread, and Blender's
@@ -69,7 +79,8 @@ class Stream:
         except OSError as error:
             raise native.PatinaError(f"{place}: the process that reads does not start: {error.strerror}", -3) from None
         self._finalizer = weakref.finalize(self, _finish, self._process, self._folder)
-        self._say({"place": place, "scalar": scalar, "workers": min(os.cpu_count() or 1, 8), "timeout": TIMEOUT, "wait": WAIT})
+        self._say({"place": place, "scalar": scalar, "workers": min(os.cpu_count() or 1, 8), "timeout": TIMEOUT, "wait": WAIT,
+                   "keep": keep and {"folder": str(keep.folder), "bytes": keep.bytes}, "offline": offline})
 
     def close(self) -> None:
         self._finalizer()
@@ -108,6 +119,8 @@ class Stream:
         cloud = native.Cloud.begin(boxes.reshape(-1, 6), gaps, self._counts, parents, self._color, self.has_scalar, True,
                                         (told["lower"], told["upper"]), int(MEMORY_SHARE * left) if left else 0)
         cloud.stream, self._cloud = self, weakref.ref(cloud)
+        for name in os.listdir(self._place):
+            self._note(name)
         return cloud
 
     # ---- its pages
@@ -147,6 +160,7 @@ class Stream:
                     self._asked, self._down = {}, True
                 if not page.isdigit():
                     continue
+                self._note(name)
                 if kind == "bad":
                     self._lose(int(page), (self._place / name).read_text("utf-8"))
                     (self._place / name).unlink()
@@ -157,6 +171,11 @@ class Stream:
                 self._asked = {}
             news, self._seen = self.arrived != self._seen, self.arrived
             return news
+
+    def _note(self, name: str) -> None:
+        if name.endswith(".note"):
+            self.notes.append(f"{self.place}: {(self._place / name).read_text('utf-8')}")
+            (self._place / name).unlink()
 
     def _rank(self, name: str) -> int:
         page = name.partition(".")[0]

@@ -8,6 +8,7 @@ A node's points are a sample of its cube; those of all nodes over a place togeth
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from source import Source, SourceError
 MOST_NODES = 1 << 23
 MOST_POINTS = 1 << 24  # of a node: more is no octree
 _INFO = 160  # bytes of its record
-_ENTRY = np.dtype([("key", "<i4", 4), ("offset", "<u8"), ("size", "<i4"), ("count", "<i4")])
+ENTRY = np.dtype([("key", "<i4", 4), ("offset", "<u8"), ("size", "<i4"), ("count", "<i4")])
 
 _BASE = [("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("intensity", "<u2"), ("bits", "u1"), ("flags", "u1"), ("class", "u1"),
          ("user_data", "u1"), ("scan_angle", "<i2"), ("point_source_id", "<u2"), ("gps_time", "<f8")]
@@ -37,7 +38,7 @@ class Tree:
     origin: np.ndarray  # (3,) float64; positions are relative to it
     laszip: bytes
     wkt: str
-    nodes: np.ndarray  # of _ENTRY
+    nodes: np.ndarray  # of ENTRY
     parents: np.ndarray  # (n,) int64; -1: none
     cubes: np.ndarray  # (n, 6) float64, relative to the origin
     gaps: np.ndarray  # (n,) float64
@@ -73,11 +74,16 @@ def read_tree(source: Source) -> Tree:
         raise SourceError("its head is damaged: records are too short, or the points lie nowhere")
     laszip, wkt = _records(source, data_offset, records)
     nodes = _hierarchy(source, root, root_size)
-    parents, cubes, gaps = _arrange(nodes, np.array(center_half_gap[:3]), center_half_gap[3], center_half_gap[4])
-    origin = np.floor(lower) if np.abs([lower, upper]).max() * 2.0 ** -24 > 0.5 * scale.min() else np.zeros(3)
+    parents, cubes, gaps = arrange(nodes, np.array(center_half_gap[:3]), center_half_gap[3], center_half_gap[4])
+    origin = origin_of(lower, upper, float(scale.min()))
     grown = np.tile(np.array([-1, 1])[:, None] * scale, 1).reshape(1, 6)  # points are rounded to the scale
     return Tree(np.dtype(fields + [("more", f"V{more}")] * bool(more)), scale, offset, lower, upper, origin, laszip, wkt, nodes, parents,
                 cubes - np.tile(origin, 2) + grown, gaps)
+
+
+def origin_of(lower: np.ndarray, upper: np.ndarray, step: float) -> np.ndarray:
+    """What positions are relative to, so that float32 holds steps of the file's."""
+    return np.floor(lower) if np.abs([lower, upper]).max() * 2.0 ** -24 > 0.5 * step else np.zeros(3)
 
 
 def _records(source: Source, end: int, count: int) -> tuple[bytes, str]:
@@ -104,10 +110,10 @@ def _hierarchy(source: Source, root: int, root_size: int) -> np.ndarray:
     pages, found, seen, total = [(root, root_size)], [], set(), 0
     while pages:
         offset, size = pages.pop()
-        if offset in seen or offset > 1 << 60 or size <= 0 or size % _ENTRY.itemsize or size > _ENTRY.itemsize * MOST_NODES:
+        if offset in seen or offset > 1 << 60 or size <= 0 or size % ENTRY.itemsize or size > ENTRY.itemsize * MOST_NODES:
             raise SourceError("its octree is damaged: a page of the hierarchy lies nowhere, or twice")
         seen.add(offset)
-        entries = np.frombuffer(source.read(offset, size), _ENTRY)
+        entries = np.frombuffer(source.read(offset, size), ENTRY)
         pages += [(int(entry["offset"]), int(entry["size"])) for entry in entries[entries["count"] == -1]]
         found.append(entries[entries["count"] > 0])
         total += len(found[-1])
@@ -116,11 +122,16 @@ def _hierarchy(source: Source, root: int, root_size: int) -> np.ndarray:
     nodes = np.concatenate(found)
     if not len(nodes) or (nodes["size"] <= 0).any() or (nodes["count"] > MOST_POINTS).any():
         raise SourceError("its octree is damaged: a node has no points, or too many")
-    order = np.lexsort([nodes["key"][:, k] for k in (3, 2, 1, 0)])  # by depth first
-    return nodes[order]
+    return in_order(nodes)
 
 
-def _arrange(nodes: np.ndarray, center: np.ndarray, half: float, gap: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def in_order(nodes: np.ndarray) -> np.ndarray:
+    """By depth first."""
+    return nodes[np.lexsort([nodes["key"][:, k] for k in (3, 2, 1, 0)])]
+
+
+def arrange(nodes: np.ndarray, center: np.ndarray, half: float, gap: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of nodes sorted by key: parents, cubes and gaps. SourceError where they are no octree's."""
     keys = nodes["key"].astype(np.int64)
     depth = keys[:, 0]
     if depth.min() < 0 or depth.max() > 30 or (keys[:, 1:] < 0).any() or (keys[:, 1:] >= (1 << depth)[:, None]).any():
@@ -137,6 +148,16 @@ def _arrange(nodes: np.ndarray, center: np.ndarray, half: float, gap: float) -> 
     side = 2.0 * half / (1 << depth)
     lower = center - half + keys[:, 1:] * side[:, None]
     return parents, np.hstack([lower, lower + side[:, None]]), gap / (1 << depth)
+
+
+def fetch(tree: Tree, index: int, source: Source) -> bytes:
+    """A node as it lies in the file."""
+    return source.read(int(tree.nodes["offset"][index]), int(tree.nodes["size"][index]))
+
+
+def key_of(tree: Tree, index: int) -> str:
+    """Of a node, as Source.forget takes it."""
+    return f"{tree.nodes['offset'][index]}-{tree.nodes['size'][index]}"
 
 
 def unpack(tree: Tree, index: int, data: bytes) -> np.ndarray:
@@ -156,11 +177,14 @@ def unpack(tree: Tree, index: int, data: bytes) -> np.ndarray:
     return records
 
 
-def color_of(tree: Tree, records: np.ndarray) -> str:
+def learn(tree: Tree, data: bytes, records: np.ndarray) -> None:
+    """What the head does not tell, by the first node: how many bits colors have."""
+    if "red" in tree.kind.names:
+        tree.color = color_of(np.stack([records[name] for name in ("red", "green", "blue")]))
+
+
+def color_of(rgb: np.ndarray) -> str:
     """How many bits colours have, by some of them."""
-    if "red" not in tree.kind.names:
-        return ""
-    rgb = np.stack([records[name] for name in ("red", "green", "blue")])
     if rgb.max() <= 255:
         return "low"
     return "high" if not (rgb & 255).any() or (rgb == (rgb >> 8) * 257).all() else "wide"
@@ -168,21 +192,31 @@ def color_of(tree: Tree, records: np.ndarray) -> str:
 
 def columns(tree: Tree, index: int, records: np.ndarray, scalar: str) -> dict[str, np.ndarray]:
     """positions (n, 3) float32, relative to the origin; colors (n, 3) uint8 or uint16; scalars (n, 1) float32; classes (n, 1) uint8."""
-    positions = np.empty((len(records), 3), np.float32)
-    box = tree.cubes[index]
-    for axis, name in enumerate("XYZ"):
-        exact = records[name] * tree.scale[axis] + (tree.offset[axis] - tree.origin[axis])
-        if exact.min() < box[axis] or exact.max() > box[3 + axis]:
-            raise SourceError("points outside of its cube")
-        positions[:, axis] = exact
+    positions = placed(records, tree.scale, tree.offset - tree.origin, tree.cubes[index])
     found = {"positions": positions, "classes": np.ascontiguousarray(records["class"][:, None])}
     if tree.color:
-        rgb = np.stack([records[name] for name in ("red", "green", "blue")], 1)
-        found["colors"] = {"low": lambda: np.minimum(rgb, 255).astype(np.uint8), "high": lambda: (rgb >> 8).astype(np.uint8),
-                           "wide": lambda: rgb}[tree.color]()
+        found["colors"] = colors_as(tree.color, np.stack([records[name] for name in ("red", "green", "blue")], 1))
     if scalar:
         found["scalars"] = scalar_of(records, scalar)
     return found
+
+
+def placed(records: Mapping[str, np.ndarray] | np.ndarray, scale: np.ndarray, offset: np.ndarray, box: np.ndarray) -> np.ndarray:
+    """(n, 3) float32 of X, Y and Z. SourceError where they are outside of the box, (6,)."""
+    positions = np.empty((len(records["X"]), 3), np.float32)
+    for axis, name in enumerate("XYZ"):
+        exact = records[name] * scale[axis] + offset[axis]
+        if not (exact.min() >= box[axis] and exact.max() <= box[3 + axis]):  # nor NaN
+            raise SourceError("points outside of its cube")
+        positions[:, axis] = exact
+    return positions
+
+
+def colors_as(how: str, rgb: np.ndarray) -> np.ndarray:
+    """(n, 3) of the file as "low", "high" or "wide" has them."""
+    if how == "wide":
+        return rgb
+    return np.minimum(rgb, 255).astype(np.uint8) if how == "low" else (rgb >> 8).astype(np.uint8)
 
 
 def scalar_of(records: np.ndarray, name: str) -> np.ndarray:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The process that reads and unpacks a COPC's pages beside Blender: python reader.py FOLDER. Blender must not run Python on threads of its
-own while it goes on (jobs.py), nor wait for a disk or a server.
+"""The process that reads and unpacks the pages of a COPC, or of a folder of EPT, beside Blender: python reader.py FOLDER. Blender must not run
+Python on threads of its own while it goes on (jobs.py), nor wait for a disk or a server.
 
-Each line of its input is JSON: first {"place", "scalar", "workers", "timeout", "wait"}, then {"pages": [...]}, which takes the place of all
-that was asked for and is not yet begun. What it finds goes into the folder, each file whole or not at all: tree.json and tree.bin, N.page with
-a page's columns one behind the other, N.bad with a sentence, down with one where nothing can be fetched any more, error with one that ends it. It
-ends with its input.
+Each line of its input is JSON: first {"place", "scalar", "workers", "timeout", "wait", "keep", "offline"}, then {"pages": [...]}, which takes the
+place of all that was asked for and is not yet begun. What it finds goes into the folder, each file whole or not at all: tree.json and tree.bin,
+N.page with a page's columns one behind the other, N.bad with a sentence, N.note with one that the artist should know of, down with one where
+nothing can be fetched any more, error with one that ends it. It ends with its input.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import copc  # noqa: E402
-from source import SourceError, source_of  # noqa: E402
+import ept  # noqa: E402
+from kept import kept  # noqa: E402
+from source import SourceError, is_ept, source_of  # noqa: E402
 
 MOST_FAILURES = 3  # pages in a row that cannot be fetched: then nothing else is tried until somebody asks again
 MOST_WAITING = 64  # pages that lie there until Blender takes them
@@ -26,12 +28,20 @@ MOST_WAITING = 64  # pages that lie there until Blender takes them
 
 class Reader:
     def __init__(self, folder: Path, wanted: dict) -> None:
-        self._folder, self._scalar = folder, wanted.get("scalar", "")
-        self._source = source_of(wanted["place"], wanted.get("timeout", 20.0), wanted.get("wait", 0.5))
-        self._tree = copc.read_tree(self._source)
-        first = self._records(0)
-        self._tree.color = copc.color_of(self._tree, first)
-        self._scalar = self._scalar if copc.has_scalar(self._tree, self._scalar) else ""
+        self._folder, self._scalar, self._notes = folder, wanted.get("scalar", ""), 0
+        place, keep = wanted["place"], wanted.get("keep")
+        self._source = source_of(place, wanted.get("timeout", 20.0), wanted.get("wait", 0.5), wanted.get("offline", ""))
+        if keep:
+            self._source = kept(self._source, keep["folder"], keep["bytes"], self._note)
+        self._kind = ept if is_ept(place) else copc
+        try:
+            self._tree = self._kind.read_tree(self._source)
+            first = self._kind.fetch(self._tree, 0, self._source)
+            self._kind.learn(self._tree, first, self._kind.unpack(self._tree, 0, first))
+        except Exception:
+            self._source.forget()
+            raise
+        self._scalar = self._scalar if self._kind.has_scalar(self._tree, self._scalar) else ""
         self._queue: list[int] = []
         self._done: set[int] = set()
         self._failures = 0
@@ -40,9 +50,9 @@ class Reader:
         for _ in range(wanted.get("workers", 2)):
             threading.Thread(target=self._work, daemon=True).start()
 
-    def _records(self, index: int):
-        node = self._tree.nodes[index]
-        return copc.unpack(self._tree, index, self._source.read(int(node["offset"]), int(node["size"])))
+    def _note(self, text: str) -> None:
+        self._notes += 1
+        self._put(f"{self._notes}.note", text.encode("utf-8", "replace"))
 
     def _tell_tree(self) -> None:
         tree = self._tree
@@ -82,9 +92,8 @@ class Reader:
                 os._exit(1)
 
     def _unpack(self, page: int) -> None:
-        node = self._tree.nodes[page]
         try:
-            data = self._source.read(int(node["offset"]), int(node["size"]))
+            data = self._kind.fetch(self._tree, page, self._source)
         except SourceError as error:
             with self._change:
                 self._done.discard(page)
@@ -96,9 +105,10 @@ class Reader:
         with self._change:
             self._failures = 0
         try:
-            records = copc.unpack(self._tree, page, data)
-            found = copc.columns(self._tree, page, records, self._scalar)
+            records = self._kind.unpack(self._tree, page, data)
+            found = self._kind.columns(self._tree, page, records, self._scalar)
         except SourceError as error:
+            self._source.forget(self._kind.key_of(self._tree, page))
             with self._change:
                 self._done.discard(page)
             self._put(f"{page}.bad", f"page {page}: {error}".encode("utf-8", "replace"))

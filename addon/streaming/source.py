@@ -1,31 +1,69 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bytes of a file, or of an address by HTTP(S) range requests. Knows neither Blender nor the library, and runs in a process of its own."""
+"""Bytes of a file, or of an address by HTTP(S) range requests, and files of a folder, or of an address's. Knows neither Blender nor the
+library, and runs in a process of its own."""
 
 from __future__ import annotations
 
+import hashlib
 import http.client
+import os
 import re
 import threading
 import time
 import urllib.error
+import urllib.parse
 import urllib.request
+from dataclasses import dataclass
 
 TIMEOUT = 20.0  # seconds without a byte
 TRIES = 3
 WAIT = 0.5  # seconds before the second one, twice as long before each further one
+HEAD = 589  # bytes of a file that are looked at first: the head of a COPC, and its record
+MOST_BYTES = 1 << 30  # of a file that is read whole
 
 
 class SourceError(Exception):
     """The text is for the artist; who catches it says where."""
 
 
+class Unreachable(SourceError):
+    """Nobody answers: the file may be as it was."""
+
+
+@dataclass(frozen=True)
+class State:
+    """What tells a version of a file from another; as far as it is known."""
+
+    total: int | None = None  # bytes
+    etag: str = ""
+    modified: str = ""
+    head: str = ""  # a hash of the first bytes
+
+    def is_of(self, other: State) -> bool:
+        """Whether both are of one version. Several servers of one address may each have ETags of their own, and the same dates."""
+        if self.total != other.total and None not in {self.total, other.total} or self.head != other.head and self.head and other.head:
+            return False
+        pairs = [pair for pair in ((self.etag, other.etag), (self.modified, other.modified)) if all(pair)]
+        return not pairs or any(own == their for own, their in pairs)
+
+
 class Source:
-    """read() from any thread."""
+    """Of one file: read(). Of a folder that ept.json tells of: file(). From any thread."""
 
     name = ""
 
     def read(self, offset: int, size: int) -> bytes:
         raise NotImplementedError
+
+    def file(self, name: str, most: int = MOST_BYTES) -> bytes:
+        raise NotImplementedError
+
+    def look(self, known: State | None) -> tuple[State, str, bytes | None]:
+        """Its state now, and the first that is read of it: what it is called, and its bytes; None: it is the known one."""
+        raise NotImplementedError
+
+    def forget(self, key: str = "") -> None:
+        """What came was no good, of "OFFSET-SIZE" or a file; "": all of it. It is to be asked for again."""
 
 
 class FileSource(Source):
@@ -48,61 +86,157 @@ class FileSource(Source):
             raise SourceError(f"ends before byte {offset + size:,}")
         return data
 
+    def look(self, known: State | None) -> tuple[State, str, bytes | None]:
+        status = os.fstat(self._file.fileno())
+        return State(status.st_size, "", str(status.st_mtime_ns)), "", None
 
-class WebSource(Source):
+
+class FolderSource(Source):
+    def __init__(self, path: str) -> None:
+        self.name = path
+        self._folder = os.path.dirname(path)
+
+    def file(self, name: str, most: int = MOST_BYTES) -> bytes:
+        try:
+            with open(os.path.join(self._folder, name), "rb") as file:
+                data = file.read(most + 1)
+        except OSError as error:
+            raise SourceError(f"{name} cannot be read: {error.strerror}") from None
+        if len(data) > most:
+            raise SourceError(f"{name} is larger than {most:,} bytes")
+        return data
+
+    def look(self, known: State | None) -> tuple[State, str, bytes | None]:
+        try:
+            status = os.stat(self.name)
+        except OSError as error:
+            raise SourceError(f"cannot be read: {error.strerror}") from None
+        return State(status.st_size, "", str(status.st_mtime_ns)), "", None
+
+
+class _Web(Source):
     """What a server does wrong is told once it has done so TRIES times."""
 
     def __init__(self, address: str, timeout: float = TIMEOUT, wait: float = WAIT) -> None:
         self.name = address
         self._timeout, self._wait = timeout, wait
-        self._total: int | None = None  # bytes, as the server said first
 
-    def read(self, offset: int, size: int) -> bytes:
+    def _get(self, address: str, part: tuple[int, int] | None, most: int, known: State | None = None) -> tuple[State, bytes | None]:
+        """A part of what lies there, (first, last), or all; None in its place: it is as it is known."""
         for attempt in range(TRIES):
             try:
-                return self._fetch(offset, size)
+                return self._fetch(address, part, most, known)
             except _Final as error:
                 raise SourceError(str(error)) from None
             except (SourceError, OSError, http.client.HTTPException, ValueError) as error:
                 why = _sentence(error)
+                kind = Unreachable if isinstance(error, (Unreachable, OSError, http.client.HTTPException)) else SourceError
             if attempt + 1 < TRIES:
                 time.sleep(self._wait * 2 ** attempt)
-        raise SourceError(f"{why}, {TRIES} times")
+        raise kind(f"{why}, {TRIES} times")
 
-    def _fetch(self, offset: int, size: int) -> bytes:
-        last = offset + size - 1
-        request = urllib.request.Request(self.name, headers={"Range": f"bytes={offset}-{last}", "Accept-Encoding": "identity",
-                                                             "User-Agent": "Patina"})
+    def _fetch(self, address: str, part: tuple[int, int] | None, most: int, known: State | None) -> tuple[State, bytes | None]:
+        headers = {"Accept-Encoding": "identity", "User-Agent": "Patina"}
+        if part:
+            headers["Range"] = f"bytes={part[0]}-{part[1]}"
+        if known and known.etag:
+            headers["If-None-Match"] = known.etag
+        if known and known.modified:
+            headers["If-Modified-Since"] = known.modified
         try:
-            answer = urllib.request.urlopen(request, timeout=self._timeout)  # noqa: S310  http and https alone: source_of
+            answer = urllib.request.urlopen(urllib.request.Request(address, headers=headers),  # noqa: S310  http and https alone: source_of
+                                            timeout=self._timeout)
         except urllib.error.HTTPError as error:
             code = error.code
             error.close()
+            if code == 304 and known:
+                return known, None
             if code in {408, 425, 429} or code >= 500:
-                raise SourceError(f"the server answers {code}") from None
+                raise Unreachable(f"the server answers {code}") from None
             raise _Final(f"the server answers {code} {error.reason}") from None
         with answer:
-            if answer.status != 206:
-                raise _Final(f"the server sends no parts of files (it answers {answer.status} to a range)")
-            self._check_range(answer.headers.get("Content-Range", ""), offset, last)
-            data = answer.read(size + 1)
+            total = None
+            if part:
+                if answer.status != 206:
+                    raise _Final(f"the server sends no parts of files (it answers {answer.status} to a range)")
+                total = _total(answer.headers.get("Content-Range", ""), *part)
+            data = answer.read(most + 1)
+            told = answer.headers.get("Content-Length", "")
+            state = State(total, answer.headers.get("ETag", ""), answer.headers.get("Last-Modified", ""))
+        size = part[1] - part[0] + 1 if part else int(told) if told.isdigit() else len(data)
+        if not part and size > most:
+            raise _Final(f"what the server sends is larger than {most:,} bytes")
         if len(data) != size:
             raise SourceError(f"the server cut the connection after {len(data):,} of {size:,} bytes" if len(data) < size else
                               f"the server sent more than the {size:,} bytes that were asked for")
+        return state, data
+
+
+class WebSource(_Web):
+    """One file on a server, of which parts are asked for."""
+
+    _state: State | None = None  # as the server said first
+
+    def read(self, offset: int, size: int) -> bytes:
+        state, data = self._get(self.name, (offset, offset + size - 1), size)
+        if self._state and not self._state.is_of(state):
+            raise SourceError("the file on the server has changed: open it again")
+        self._state = self._state or state
         return data
 
-    def _check_range(self, told: str, offset: int, last: int) -> None:
-        found = re.fullmatch(r"bytes (\d+)-(\d+)/(\d+|\*)", told.strip())
-        if not found or (int(found[1]), int(found[2])) != (offset, last):
-            raise SourceError(f"the server sent another part than was asked for ('{told[:60]}')")
-        total = None if found[3] == "*" else int(found[3])
-        if self._total is not None and total is not None and total != self._total:
-            raise _Final("the file on the server has changed: open it again")
-        self._total = self._total or total
+    def look(self, known: State | None) -> tuple[State, str, bytes | None]:
+        self._state = known  # where nobody answers, what comes later is held against it
+        state, data = self._get(self.name, (0, HEAD - 1), HEAD, known)
+        self._state = state
+        return (state if data is None else State(state.total, state.etag, state.modified, _hash(data))), f"0-{HEAD}", data
+
+
+class WebFolder(_Web):
+    """Files on a server, beside the one that tells of them."""
+
+    def file(self, name: str, most: int = MOST_BYTES) -> bytes:
+        place = urllib.parse.urlsplit(self.name)
+        path = place.path.rpartition("/")[0] + "/" + name
+        try:
+            return self._get(urllib.parse.urlunsplit(place._replace(path=path, fragment="")), None, most)[1]
+        except SourceError as error:
+            raise type(error)(f"{name}: {error}") from None
+
+    def look(self, known: State | None) -> tuple[State, str, bytes | None]:
+        state, data = self._get(self.name, None, MOST_BYTES, known)
+        return (state if data is None else State(len(data), state.etag, state.modified, _hash(data))), last_of(self.name), data
+
+
+class Nowhere(Source):
+    """Where nothing may be asked for, and why."""
+
+    def __init__(self, place: str, why: str) -> None:
+        self.name, self._why = place, why
+
+    def read(self, offset: int, size: int) -> bytes:
+        raise SourceError(self._why)
+
+    def file(self, name: str, most: int = MOST_BYTES) -> bytes:
+        raise SourceError(self._why)
+
+    def look(self, known: State | None) -> tuple[State, str, bytes | None]:
+        raise Unreachable(self._why)
 
 
 class _Final(Exception):
     """Another try would not help."""
+
+
+def _total(told: str, first: int, last: int) -> int | None:
+    """Of the file that a part is of, by its Content-Range."""
+    found = re.fullmatch(r"bytes (\d+)-(\d+)/(\d+|\*)", told.strip())
+    if not found or (int(found[1]), int(found[2])) != (first, last):
+        raise SourceError(f"the server sent another part than was asked for ('{told[:60]}')")
+    return None if found[3] == "*" else int(found[3])
+
+
+def _hash(data: bytes) -> str:
+    return hashlib.blake2b(data, digest_size=16).hexdigest()
 
 
 def _sentence(error: Exception) -> str:
@@ -120,5 +254,20 @@ def is_address(place: str) -> bool:
     return place.lower().startswith(("http://", "https://"))
 
 
-def source_of(place: str, timeout: float = TIMEOUT, wait: float = WAIT) -> Source:
-    return WebSource(place, timeout, wait) if is_address(place) else FileSource(place)
+def last_of(place: str) -> str:
+    """The name of what a path or an address names, without its folder."""
+    return (urllib.parse.urlsplit(place).path if is_address(place) else place.replace(os.sep, "/")).rpartition("/")[2]
+
+
+def is_ept(place: str) -> bool:
+    """Whether it tells of a folder of Entwine point tiles."""
+    return last_of(place).lower() == "ept.json"
+
+
+def source_of(place: str, timeout: float = TIMEOUT, wait: float = WAIT, offline: str = "") -> Source:
+    """offline: why nothing may be fetched."""
+    if is_address(place):
+        if offline:
+            return Nowhere(place, offline)
+        return (WebFolder if is_ept(place) else WebSource)(place, timeout, wait)
+    return (FolderSource if is_ept(place) else FileSource)(place)

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from .. import native, preferences
-from ..streaming.source import is_address
+from ..streaming.source import is_address, is_ept
 
 LARGE = 20_000_000  # points: from here on a COPC is read as it is wanted, where nobody chose
 
@@ -20,7 +20,8 @@ class Address(str):
 
     @property
     def name(self) -> str:
-        return self.rstrip("/").rpartition("/")[2].partition("?")[0] or self
+        path = self.partition("?")[0].rstrip("/")
+        return (path.removesuffix("/ept.json") if is_ept(self) else path).rpartition("/")[2] or self
 
     @property
     def stem(self) -> str:
@@ -37,14 +38,21 @@ def open_once(address: str) -> None:
 
 def check(address: str) -> None:
     """PatinaError with a sentence where nothing may be fetched from there."""
+    why = refusal(address)
+    if why:
+        raise native.PatinaError(why, -5)
+
+
+def refusal(address: str) -> str:
+    """Why nothing may be fetched from there; "" where it may."""
     if not is_address(address):
-        raise native.PatinaError("only http and https addresses are read", -5)
+        return "only http and https addresses are read"
     if not online():
-        raise native.PatinaError("Blender may not go online: Preferences > System > Network > Allow Online Access"
-                                 if hasattr(bpy.app, "online_access") else
-                                 "the add-on may not go online: Allow Online Access in its preferences", -5)
+        return ("Blender may not go online: Preferences > System > Network > Allow Online Access" if hasattr(bpy.app, "online_access") else
+                "the add-on may not go online: Allow Online Access in its preferences")
     if address not in _opened and not bpy.app.background:
-        raise native.PatinaError("nothing is fetched from an address of a file that was opened: Open Address, beside it, does", -5)
+        return "nothing is fetched from an address of a file that was opened: Open Address, beside it, does"
+    return ""
 
 
 def online() -> bool:
@@ -55,7 +63,11 @@ def online() -> bool:
 
 
 def is_streamed(path: Path, how: str) -> bool:
-    """Whether a linked file is a COPC, and to be read as it is wanted. how: 'AUTO' or 'ON'."""
+    """Whether a linked file is to be read as it is wanted: folders of EPT always, a COPC by how: 'AUTO', 'ON' or 'OFF'."""
+    if is_ept(str(path)):
+        return path.is_file()
+    if how == 'OFF':
+        return False
     from ..importers.las import is_copc  # which is loaded with its first file
     try:
         points = is_copc(path)

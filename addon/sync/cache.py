@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is in the folder of caches: clouds of linked files, and packed files put down to be read. All can be made anew."""
+"""What is in the folder of caches: clouds of linked files, and packed files put down to be read; and what was fetched of addresses. All
+can be made or fetched anew."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
 
+import bpy
+
+from .. import preferences, streaming
+from ..streaming import shelf
+from ..streaming.source import is_address
 from . import kept
 
 _KEPT = ("*.cloud", "*.json", "*.scan", "*-packed.*")
@@ -32,3 +38,28 @@ def clear() -> tuple[int, int]:
 def _files() -> Iterator[Path]:
     place = kept.folder()
     return (path for pattern in _KEPT for path in place.glob(pattern) if path.is_file())
+
+
+def keep_of(place: str) -> streaming.Keep | None:
+    """Where what is fetched of a path or an address is kept; None where the artist does not want that."""
+    known = preferences.get()
+    if not known or known.keep_pages == 'OFF' or known.keep_pages == 'ADDRESSES' and not is_address(place):
+        return None
+    return streaming.Keep(pages_folder(), preferences.GIGA * known.pages_limit)
+
+
+def pages_folder() -> Path:
+    """Of what was fetched. It need not be there."""
+    known = preferences.get()
+    return Path(bpy.path.abspath(known.pages_folder)) if known and known.pages_folder else kept.folder() / "pages"
+
+
+def pages_held() -> tuple[int, int]:
+    """How many parts of files, and bytes, are kept."""
+    sizes = [size for _, size, _ in shelf.files(pages_folder())]
+    return len(sizes), sum(sizes)
+
+
+def clear_pages() -> tuple[int, int]:
+    """Deletes them; how many, and bytes, are gone."""
+    return shelf.clear(pages_folder())

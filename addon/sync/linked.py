@@ -21,7 +21,8 @@ from .. import importers, jobs, native, preferences, streaming
 from ..importers import crs
 from ..importers import scans as scans_of_files
 from ..importers.origin import PROPERTY
-from . import addresses, analysis, analyzing, attributes, files, kept, sequence
+from ..streaming import shelf
+from . import addresses, analysis, analyzing, attributes, cache, files, kept, sequence
 from .colors import scalar_name
 from .losses import Loss
 from .soft import attribute_name
@@ -78,7 +79,7 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str], analyzed: b
     origin = pattern = None
     if isinstance(path, addresses.Address):
         return source(path, scalar=scalar_name(obj) or attribute_name(obj))
-    if obj.patina.stream != 'OFF' and not sequence.is_pattern(path) and addresses.is_streamed(path, obj.patina.stream):
+    if not sequence.is_pattern(path) and addresses.is_streamed(path, obj.patina.stream):
         found = source(path, scalar=scalar_name(obj) or attribute_name(obj), streamed=True)
         if found:
             return found
@@ -117,7 +118,7 @@ def source(path: Path | addresses.Address, origin: Corner | None = None, scalar:
 
 def _streamed(path: Path | addresses.Address, scalar: str) -> Source | None:
     """Nothing is analyzed or kept of it."""
-    state = ""
+    state = "" if isinstance(path, Path) or not addresses.refusal(path) else "kept alone"
     if isinstance(path, Path):
         try:
             status = path.stat()
@@ -230,11 +231,15 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
 
 
 def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
-    """The head of a COPC, whose points come later."""
+    """The head of a COPC or an EPT, whose points come later; where nothing may be fetched, what is kept of it."""
+    place, offline = str(source.path), ""
+    keep = cache.keep_of(place)
     if isinstance(source.path, addresses.Address):
-        addresses.check(source.path)
+        offline = addresses.refusal(place)
+        if not keep or not shelf.holds(keep.folder, place):
+            addresses.check(place)
     progress.doing = "Reading the octree"
-    stream = streaming.Stream(str(source.path), source.scalar)
+    stream = streaming.Stream(place, source.scalar, keep, offline)
     try:
         cloud = yield from stream.steps(lambda: progress.step(0.5))
     except BaseException:

@@ -35,7 +35,7 @@ def write_copc(path, records, offset=(0.0, 0.0, 0.0), least=400, wkt="", pages=F
     gap = np.sqrt(4 * np.pi / max(least, 1))
     vlr = lazrs.LazVlr.new_for_compression(7, 0, True)
     laszip = bytes(vlr.record_data())
-    nodes = _nodes(records, half, least)
+    nodes = nodes_of(records, half, least)
     info = np.zeros(160, np.uint8).tobytes()
     texts = [(b"copc", 1, info), (b"laszip encoded", 22204, laszip)] + ([(b"LASF_Projection", 2112, wkt.encode() + b"\0")] if wkt else [])
     data_offset = 375 + sum(54 + len(data) for _, _, data in texts)
@@ -68,7 +68,7 @@ def write_copc(path, records, offset=(0.0, 0.0, 0.0), least=400, wkt="", pages=F
     return entries
 
 
-def _nodes(records, half, least):
+def nodes_of(records, half, least):
     """(key, records) by depth: each node keeps `least` points of its cube, evenly taken, the rest goes to its children."""
     found, waiting = [], [((0, 0, 0, 0), records)]
     while waiting:
