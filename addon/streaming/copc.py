@@ -164,6 +164,8 @@ def unpack(tree: Tree, index: int, data: bytes) -> np.ndarray:
     """A node's records. SourceError where they are not what the file promises."""
     import lazrs
     count = int(tree.nodes["count"][index])
+    if not _fits(tree.kind, count, data):
+        raise SourceError("cannot be unpacked: its layers are longer than it is, or of other points")
     records = np.zeros(count, tree.kind)
     try:
         lazrs.decompress_points_with_chunk_table(data, tree.laszip, records.view(np.uint8), [(count, len(data))],
@@ -175,6 +177,18 @@ def unpack(tree: Tree, index: int, data: bytes) -> np.ndarray:
             raise
         raise SourceError(f"cannot be unpacked: {error}") from None
     return records
+
+
+def _fits(kind: np.dtype, count: int, data: bytes) -> bool:
+    """Whether a chunk's head is one: lazrs takes memory for layers as long as they say they are, 4 GB each. After the first point come the
+    number of points and the sizes of the layers: nine, one of colours, one of infrared, one of each further byte."""
+    names = kind.names
+    layers = 9 + ("red" in names) + ("nir" in names) + (kind["more"].itemsize if "more" in names else 0)
+    rest = len(data) - kind.itemsize - 4 * (1 + layers)
+    if rest < 0:
+        return False
+    told, *sizes = struct.unpack_from(f"<I{layers}I", data, kind.itemsize)
+    return told == count and sum(sizes) <= rest
 
 
 def learn(tree: Tree, data: bytes, records: np.ndarray) -> None:
