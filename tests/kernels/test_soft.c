@@ -259,8 +259,8 @@ static const struct ref_soft *reference(struct harness *h, const struct setup *s
         return kept;
     struct ref_soft *out = harness_alloc(h, s->pixels * sizeof *out);
     for (size_t i = 0; i < s->pixels; i++)
-        out[i] = ref_soft(&s->args, s->records, (int)(i % s->args.view.width), (int)(i / s->args.view.width), (double)reached[i],
-                          ref_key_z(s->keys[i]));
+        out[i] = ref_soft(&s->args, s->records, (int)(i % s->args.view.width), (int)(i / s->args.view.width),
+                          (double)reached[i], ref_key_z(s->keys[i]));
     harness_keep(h, out, s->pixels * sizeof *out);
     return out;
 }
