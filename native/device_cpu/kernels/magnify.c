@@ -1,21 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // magnify: faces between cells -> pixels of the picture that show them [K II.D]; twin of shaders/kernels/magnify.comp
 //
-// The twin looks from each pixel at the 3 x 3 cells around. Here a row of pixels is walked face by face, from those below to those above, left to
-// right, so that each pixel meets its faces in the same order: what cells say is then one number for all lanes, and what two passes over a face
-// would find anew is found once a cell. Pixels that no face covers look around as the twin does.
+// The twin looks from each pixel at the 3 x 3 cells around. Here PT_LANES pixels do, and what cells say is found once: of each row of cells, in
+// vectors of cells, their numbers and how the faces above and right of them are divided; of the pixels of several rows that lie in one row of
+// cells, whatever does not depend on their row. Which face covers a pixel is asked of two triangles between 2 x 2 cells; what it is like
+// there, of the one that does alone. Face by face along each row of pixels took half as long again.
 #include "device_cpu/kernels/ranges.h"
+#include "device_cpu/simd/near.h"
 #include "shared/ranges.h"
 
 #include <math.h>
 
-enum { AROUND = 9 }; // cells that may be corners of a face over a pixel: 3 x 3, row by row
+// AROUND: cells that may be corners of a face over a pixel: 3 x 3, row by row. QUADS: of them, what lies between 2 x 2.
+enum { AROUND = 9, QUADS = 4, PAD = 2, BATCH = 16 }; // PAD: cells left and right of a row's; BATCH: rows of pixels
 
-struct corners {
+struct corners {                  // of PT_LANES pixels
     vf x[AROUND], y[AROUND];      // from the pixel's centre, in cells
     vf z[AROUND], factor[AROUND]; // 1 / z, or 1 in orthographic views
     vm some[AROUND];
     vi cell[AROUND];
+    vf height[AROUND]; // of the place over the pixels' row of cells; y is that less where in it the pixels lie
+    vi quad[QUADS];    // words of what lies between
+    uint32_t all;      // bits that some of them have
+    vm falling[QUADS];
+    // of whole ones: the ends of what divides them, the lower triangle's third corner and the upper one's first
+    vf end_x[QUADS][2], end_height[QUADS][2], end_z[QUADS][2], end_factor[QUADS][2];
+    vi end_cell[QUADS][2];
 };
 
 struct found {       // the nearest face
@@ -24,20 +34,28 @@ struct found {       // the nearest face
     vi cell[3];      // of its corners
 };
 
-// Of the faces between a cell, the lower left one, and those right of it, above and across.
+struct face { // that covers pixels
+    vm some;
+    vf edge[3], z[3], factor[3]; // edge: twice the area opposite each corner
+    vi cell[3];
+};
+
+// A word of the faces between a cell, the lower left one, and those right of it, above and across.
 enum {
-    FITS = 1,
-    WHOLE = 1 << 4,
-    FALLING = 1 << 5,
-    THERE = 1 << 6
-}; // FITS << triangle; FALLING: divided from right to above; THERE: the cell
+    FITS = 1,         // << triangle
+    WHOLE = 1 << 4,   // all fit: two are taken
+    FALLING = 1 << 5, // those divided from right to above
+    LOOSE = 1 << 6,   // three are there that are not joined
+    ODD = 1 << 7      // some fit, and are taken
+};
 
 // The four triangles: a b below, d e above.
 static const int triples[4][3] = {{0, 1, 2}, {1, 3, 2}, {0, 1, 3}, {0, 3, 2}};
 
-struct row { // of pixels, a thread's
-    float *z, *weight[3];
-    uint32_t *cell[3];
+struct cell_row {       // of cells, number PAD + column
+    int32_t y, divided; // whose; the same where `quads` holds
+    float *x, *y_of, *z, *factor;
+    uint32_t *there, *quads;
 };
 
 struct walk {
@@ -45,39 +63,11 @@ struct walk {
     const struct magnify_args *args;
     const struct view_args *cells;
     const float *places;
-    const uint8_t *faces;   // a byte a cell
     const float *across;    // of each column of pixels: where in its cell
     const uint32_t *column; // and which cell
-    const uint32_t *first;  // of each column of cells, and two behind: the first column of pixels
-    char *memory;           // of rows, per thread
-    size_t thread_bytes;
+    char *memory;           // of rows of cells, per thread
+    size_t thread_bytes, row_values;
 };
-
-static void look_around(const struct walk *walk, vi x, uint32_t y, vm lanes, struct corners *out)
-{
-    const struct magnify_args *args = walk->args;
-    const struct view_args *view = &args->view, *cells = walk->cells;
-    const vf half = vf_set(0.5f), inverse = vf_set(args->inverse), one = vf_set(1.0f);
-    const vf px = (vi_convert(vi_add(x, vi_set((uint32_t)view->origin_x))) + half) * inverse;
-    const vf py = (vf_set((float)(view->origin_y + (int32_t)y)) + half) * inverse;
-    const vf column = vf_floor(px), row = vf_floor(py), across = px - column, up = py - row;
-    const vi cx = vi_sub(vf_int(column), vi_set((uint32_t)cells->origin_x)),
-             cy = vi_sub(vf_int(row), vi_set((uint32_t)cells->origin_y));
-    const float *places = PT_DATA(walk->call, magnify, place);
-    for (int k = 0; k < AROUND; k++) {
-        const int dx = k % 3 - 1, dy = k / 3 - 1;
-        const vi ox = vi_add(cx, vi_set((uint32_t)dx)), oy = vi_add(cy, vi_set((uint32_t)dy));
-        const vm inside = vm_and(lanes, pt_range_inside(cells, ox, oy));
-        vf place[4];
-        out->cell[k] = vi_add(vi_mul(oy, vi_set(cells->width)), ox);
-        vf_gather4(places, out->cell[k], inside, place);
-        out->some[k] = vm_and(inside, vf_lt(vf_zero(), place[3]));
-        out->x[k] = (vf_set((float)dx) + place[0]) - across;
-        out->y[k] = (vf_set((float)dy) + place[1]) - up;
-        out->z[k] = vf_select(out->some[k], place[2], one);
-        out->factor[k] = view->perspective ? vf_rcp(out->z[k]) : one;
-    }
-}
 
 static inline vf lesser(vf a, vf b) { return vf_min(a, b); }
 
@@ -179,168 +169,276 @@ static void take_places(const struct walk *walk, const struct corners *c, vm lan
     }
 }
 
-// ---- faces -------------------------------------------------------------------------------------------------------------------------
+// ---- rows of cells -----------------------------------------------------------------------------------------------------------------
 
-static inline float lesser_of(float a, float b) { return a < b ? a : b; }
-static inline float greater_of(float a, float b) { return a > b ? a : b; }
-
-// As pt_range_step has it.
-static float step_from(const struct walk *walk, float z)
+// What is there of the row y, in columns from `left` to before `right`.
+static void read_cells(const struct walk *walk, struct cell_row *row, int32_t y, int32_t left, int32_t right)
 {
     const struct view_args *cells = walk->cells;
-    const float width = cells->footprint * (float)(1u << cells->level), footprint = cells->perspective ? width * z : width;
-    const float gamma = greater_of(walk->args->gamma, walk->args->gamma_cells * footprint);
-    return greater_of(gamma, PT_RANGE_STEEP * footprint);
-}
-
-static uint32_t look_at(const struct walk *walk, const float *const corner[4])
-{
-    uint32_t found = 0.0f < corner[0][3] ? THERE : 0;
-    for (int t = 0; t < 4; t++) {
-        const float *const p = corner[triples[t][0]], *const q = corner[triples[t][1]], *const r = corner[triples[t][2]];
-        if (!(0.0f < p[3]) || !(0.0f < q[3]) || !(0.0f < r[3]))
-            continue;
-        const float nearest = lesser_of(lesser_of(p[2], q[2]), r[2]), farthest = greater_of(greater_of(p[2], q[2]), r[2]);
-        found |= farthest - nearest <= step_from(walk, nearest) ? (uint32_t)FITS << t : 0;
+    const int here = y >= (int32_t)cells->rect[1] && y < (int32_t)cells->rect[3];
+    const vf zero = vf_zero(), one = vf_set(1.0f);
+    row->y = y;
+    row->divided = INT32_MIN;
+    for (int32_t x = left; x < right; x += PT_LANES) {
+        const vi column = vi_add(vi_set((uint32_t)x), vi_lanes());
+        const vm inside = here ? pt_range_inside(cells, column, vi_set((uint32_t)y)) : vm_of_bits(0);
+        const int32_t at = y * (int32_t)cells->width + x;
+        vf place[4] = {zero, zero, zero, zero};
+        if (vm_bits(inside) == PT_ALL)
+            vf_load4(walk->places + 4 * (ptrdiff_t)at, place);
+        else if (vm_bits(inside))
+            vf_gather4(walk->places, vi_add(vi_set((uint32_t)at), vi_lanes()), inside, place);
+        const vm some = vm_and(inside, vf_lt(zero, place[3]));
+        const vf z = vf_select(some, place[2], one);
+        vf_store(row->x + PAD + x, place[0]);
+        vf_store(row->y_of + PAD + x, place[1]);
+        vf_store(row->z + PAD + x, z);
+        vf_store(row->factor + PAD + x, walk->args->view.perspective ? vf_rcp(z) : one);
+        vi_store(row->there + PAD + x, vi_select(some, vi_set(1), vi_set(0)));
     }
-    if ((found & 15u * FITS) != 15u * FITS)
-        return found;
-    const float nearest = lesser_of(lesser_of(corner[0][2], corner[1][2]), lesser_of(corner[2][2], corner[3][2]));
-    const float farthest = greater_of(greater_of(corner[0][2], corner[1][2]), greater_of(corner[2][2], corner[3][2]));
-    found |= farthest - nearest <= step_from(walk, nearest) ? WHOLE : 0;
-    return found | (fabsf(corner[1][2] - corner[2][2]) <= fabsf(corner[0][2] - corner[3][2]) ? FALLING : 0);
 }
 
-// The bytes of a row of cells.
-static void look_at_cells(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+static vm is_there(const uint32_t *there) { return vi_eq(vi_load(there), vi_set(1)); }
+static vi bit_where(vm some, uint32_t bit) { return vi_select(some, vi_set(bit), vi_set(0)); }
+
+// How PT_LANES faces are divided, from their corners.
+static vi divided(const struct walk *walk, const vf z[4], const vm there[4])
 {
-    static const float none[4] = {0};
-    const struct walk *walk = context;
-    const uint32_t *rect = walk->cells->rect, width = walk->cells->width;
-    (void)thread;
-    for (uint32_t y = begin + rect[1]; y < end + rect[1]; y++)
-        for (uint32_t x = rect[0]; x < rect[2]; x++) {
-            const size_t at = (size_t)y * width + x;
-            const float *place = walk->places + 4 * at;
-            const int right = x + 1 < rect[2], above = y + 1 < rect[3];
-            const float *const corner[4] = {place, right ? place + 4 : none, above ? place + 4 * (size_t)width : none,
-                                            right && above ? place + 4 * (size_t)width + 4 : none};
-            ((uint8_t *)walk->faces)[at] = (uint8_t)look_at(walk, corner);
-        }
+    const struct magnify_args *args = walk->args;
+    vm all = vm_first(PT_LANES), any = vm_of_bits(0), loose = any;
+    vi word = vi_set(0);
+    for (int t = 0; t < 4; t++) {
+        const int *k = triples[t];
+        const vm three = vm_and(vm_and(there[k[0]], there[k[1]]), there[k[2]]);
+        const vf nearest = lesser(lesser(z[k[0]], z[k[1]]), z[k[2]]), farthest = vf_max(vf_max(z[k[0]], z[k[1]]), z[k[2]]);
+        const vm joint = vf_le(farthest - nearest, pt_range_step(walk->cells, args->gamma, args->gamma_cells, nearest));
+        const vm fit = vm_and(three, joint);
+        word = vi_or(word, bit_where(fit, (uint32_t)FITS << t));
+        all = vm_and(all, fit);
+        any = vm_or(any, fit);
+        loose = vm_or(loose, vm_and(three, vm_not(joint)));
+    }
+    const vf nearest = lesser(lesser(z[0], z[1]), lesser(z[2], z[3])),
+             farthest = vf_max(vf_max(z[0], z[1]), vf_max(z[2], z[3]));
+    const vm whole = vm_and(all,
+                            vf_le(farthest - nearest, pt_range_step(walk->cells, args->gamma, args->gamma_cells, nearest)));
+    const vm falling = vm_and(whole, vf_le(vf_abs(z[1] - z[2]), vf_abs(z[0] - z[3])));
+    word = vi_or(word, vi_or(bit_where(whole, WHOLE), bit_where(falling, FALLING)));
+    return vi_or(word, vi_or(bit_where(loose, LOOSE), bit_where(vm_and(any, vm_not(whole)), ODD)));
 }
 
-// Takes one where it is nearer, of the pixels from x on. edges: opposite each corner.
-static inline void take_face(const struct row *row, uint32_t x, vm lanes, const vf edges[3], const float z[3],
-                             const vf factor[3], const uint32_t cells[3])
+static void divide(const struct walk *walk, struct cell_row *row, const struct cell_row *above, int32_t left, int32_t right)
 {
-    const vf zero = vf_zero();
-    const vm left = vm_and(vm_and(vf_le(zero, edges[0]), vf_le(zero, edges[1])), vf_le(zero, edges[2]));
-    const vm right = vm_and(vm_and(vf_le(edges[0], zero), vf_le(edges[1], zero)), vf_le(edges[2], zero));
-    vm some = vm_and(lanes, vm_or(left, right));
-    if (!vm_bits(some))
-        return;
+    row->divided = row->y;
+    for (int32_t x = left + PAD; x + 1 < right + PAD; x += PT_LANES) {
+        const vf z[4] = {vf_load(row->z + x), vf_load(row->z + x + 1), vf_load(above->z + x), vf_load(above->z + x + 1)};
+        const vm there[4] = {is_there(row->there + x), is_there(row->there + x + 1), is_there(above->there + x),
+                             is_there(above->there + x + 1)};
+        vi_store(row->quads + x, divided(walk, z, there));
+    }
+}
+
+// Rows of cells around the row `cy`, of which three lie in `rows`, by their number.
+static void hold(const struct walk *walk, struct cell_row rows[3], int32_t cy, struct cell_row *around[3])
+{
+    const uint32_t *rect = walk->args->view.rect;
+    const int32_t left = (int32_t)walk->column[rect[0]] - 1, right = (int32_t)walk->column[rect[2] - 1] + 2;
+    for (int32_t k = 0; k < 3; k++) {
+        around[k] = &rows[(uint32_t)(cy + 2 + k) % 3];
+        if (around[k]->y != cy - 1 + k)
+            read_cells(walk, around[k], cy - 1 + k, left, right);
+    }
+    for (int k = 0; k < 2; k++)
+        if (around[k]->divided != around[k]->y)
+            divide(walk, around[k], around[k + 1], left, right);
+}
+
+// ---- faces -------------------------------------------------------------------------------------------------------------------------
+
+static inline __attribute__((always_inline)) vi pick(const void *row, vi at, int near)
+{
+    return near ? vi_near(row, at) : vi_gather(row, at, vm_first(PT_LANES));
+}
+static inline __attribute__((always_inline)) vf pick_float(const float *row, vi at, int near)
+{
+    return vi_float(pick(row, at, near));
+}
+
+// Ends of what divides whole ones, and what else depends on which: of b to d, or of a to e.
+static inline __attribute__((always_inline)) void take_ends(struct corners *out, int q, int a)
+{
+    const vm falling = out->falling[q];
+    const int ends[2][2] = {{a + 1, a + 4}, {a + 3, a}}; // where falling, and where not
+    const int others[2][2] = {{a + 3, a + 4}, {a + 1, a}};
+    for (int i = 0; i < 2; i++) {
+        out->end_x[q][i] = vf_select(falling, out->x[ends[i][0]], out->x[ends[i][1]]);
+        out->end_height[q][i] = vf_select(falling, out->height[ends[i][0]], out->height[ends[i][1]]);
+        out->end_z[q][i] = vf_select(falling, out->z[others[i][0]], out->z[others[i][1]]);
+        out->end_factor[q][i] = vf_select(falling, out->factor[others[i][0]], out->factor[others[i][1]]);
+        out->end_cell[q][i] = vi_select(falling, out->cell[others[i][0]], out->cell[others[i][1]]);
+    }
+}
+
+// near: the pixels' cells lie among PT_LANES. Whether there is any.
+static inline __attribute__((always_inline)) int look_among(const struct walk *walk, struct cell_row *const rows[3], uint32_t x,
+                                                            vm lanes, struct corners *out, int near)
+{
+    const int32_t first = (int32_t)walk->column[x], base = first - 1 + PAD;
+    const vi at = vi_select(lanes, vi_sub(vi_load(walk->column + x), vi_set((uint32_t)first)), vi_set(0));
+    const vf across = vf_load(walk->across + x);
+    vm any = vm_of_bits(0);
+    for (int k = 0; k < AROUND; k++) {
+        out->some[k] = vi_eq(pick(rows[k / 3]->there + base + k % 3, at, near), vi_set(1));
+        any = vm_or(any, out->some[k]);
+    }
+    if (!vm_bits(vm_and(any, lanes)))
+        return 0;
+    for (int k = 0; k < AROUND; k++) {
+        const struct cell_row *row = rows[k / 3];
+        const int32_t from = base + k % 3;
+        const float dx = (float)(k % 3 - 1), dy = (float)(k / 3 - 1);
+        out->x[k] = (vf_set(dx) + pick_float(row->x + from, at, near)) - across;
+        out->height[k] = vf_set(dy) + pick_float(row->y_of + from, at, near);
+        out->z[k] = pick_float(row->z + from, at, near);
+        out->factor[k] = pick_float(row->factor + from, at, near);
+        out->cell[k] = vi_add(vi_set((uint32_t)(row->y * (int32_t)walk->cells->width + first + k % 3 - 1)), at);
+    }
+    vi all = vi_set(0);
+    for (int q = 0; q < QUADS; q++) {
+        out->quad[q] = vi_select(lanes, pick(rows[q / 2]->quads + base + q % 2, at, near), vi_set(0));
+        out->falling[q] = vi_eq(vi_and(out->quad[q], vi_set(FALLING)), vi_set(FALLING));
+        all = vi_or(all, out->quad[q]);
+        take_ends(out, q, q % 2 + 3 * (q / 2));
+    }
+    out->all = 0;
+    for (uint32_t bit = WHOLE; bit <= ODD; bit <<= 1)
+        out->all |= vm_bits(vm_not(vi_eq(vi_and(all, vi_set(bit)), vi_set(0)))) ? bit : 0;
+    return 1;
+}
+
+static int look_around(const struct walk *walk, struct cell_row *const rows[3], uint32_t x, uint32_t count, struct corners *out)
+{
+    const vm lanes = vm_first(count);
+    if (walk->column[x + count - 1] - walk->column[x] < PT_LANES)
+        return look_among(walk, rows, x, lanes, out, 1);
+    return look_among(walk, rows, x, lanes, out, 0);
+}
+
+// What a face is like where it is the nearest.
+static inline __attribute__((always_inline)) void show_face(const struct face *face, struct found *best)
+{
     vf weight[3];
     for (int i = 0; i < 3; i++)
-        weight[i] = vf_abs(edges[i]) * factor[i];
+        weight[i] = vf_abs(face->edge[i]) * face->factor[i];
     const vf sum = (weight[0] + weight[1]) + weight[2];
-    some = vm_and(some, vf_lt(vf_set(1e-30f), sum));
-    const vf share = vf_rcp(vf_select(some, sum, vf_set(1.0f))), best = vf_load(row->z + x);
-    vf depth = ((weight[0] * vf_set(z[0]) + weight[1] * vf_set(z[1])) + weight[2] * vf_set(z[2])) * share;
-    depth = vf_min(vf_max(depth, vf_set(lesser_of(lesser_of(z[0], z[1]), z[2]))),
-                   vf_set(greater_of(greater_of(z[0], z[1]), z[2])));
-    some = vm_and(some, vf_lt(depth, best));
-    vf_store(row->z + x, vf_select(some, depth, best));
+    vm some = vm_and(face->some, vf_lt(vf_set(1e-30f), sum));
+    const vf share = vf_rcp(vf_select(some, sum, vf_set(1.0f)));
+    vf z = ((weight[0] * face->z[0] + weight[1] * face->z[1]) + weight[2] * face->z[2]) * share;
+    z = vf_min(vf_max(z, lesser(lesser(face->z[0], face->z[1]), face->z[2])),
+               vf_max(vf_max(face->z[0], face->z[1]), face->z[2]));
+    some = vm_and(some, vf_lt(z, best->z));
+    best->z = vf_select(some, z, best->z);
     for (int i = 0; i < 3; i++) {
-        vf_store(row->weight[i] + x, vf_select(some, weight[i] * share, vf_load(row->weight[i] + x)));
-        vi_store(row->cell[i] + x, vi_select(some, vi_set(cells[i]), vi_load(row->cell[i] + x)));
+        best->weight[i] = vf_select(some, weight[i] * share, best->weight[i]);
+        best->cell[i] = vi_select(some, face->cell[i], best->cell[i]);
     }
 }
 
-// The faces above and right of a cell, in the row of pixels: those of pixels whose cell is in its column or the next. y: of its corners,
-// from the pixels' centres, in cells.
-static void take_cell(const struct walk *walk, const struct row *row, uint32_t column, size_t at, const float y[4])
+// Takes a triangle to what waits, of the pixels that it covers. A pixel that waits already has its own shown before.
+static inline __attribute__((always_inline)) void take_face(struct face *waits, vm fits, vf edge_a, vf edge_b, vf edge_c,
+                                                            const vf *const z[3], const vf *const factor[3],
+                                                            const vi *const cell[3], struct found *best)
 {
-    const uint32_t faces = walk->faces[at], *rect = walk->args->view.rect, width = walk->cells->width;
-    const uint32_t cell[4] = {(uint32_t)at, (uint32_t)at + 1, (uint32_t)at + width, (uint32_t)at + width + 1};
-    const uint32_t begin = walk->first[column] > rect[0] ? walk->first[column] : rect[0],
-                   end = walk->first[column + 2] < rect[2] ? walk->first[column + 2] : rect[2];
-    uint32_t taken = faces & 15u * FITS;
-    if (faces & WHOLE)
-        taken &= (faces & FALLING ? 3u : 12u) * FITS;
-    const vf zero = vf_zero(), one = vf_set(1.0f);
-    vf factor[4], py[4];
-    for (int k = 0; k < 4; k++) {
-        factor[k] = walk->args->view.perspective ? vf_rcp(vf_set(walk->places[4 * (size_t)cell[k] + 2])) : one;
-        py[k] = vf_set(y[k]);
+    const vf zero = vf_zero(), least = vf_min(vf_min(edge_a, edge_b), edge_c), most = vf_max(vf_max(edge_a, edge_b), edge_c);
+    const vm some = vm_and(fits, vm_or(vf_le(zero, least), vf_le(most, zero)));
+    if (!vm_bits(some))
+        return;
+    if (vm_bits(vm_and(some, waits->some))) {
+        show_face(waits, best);
+        waits->some = vm_of_bits(0);
     }
-    for (uint32_t x = begin; x < end; x += PT_LANES) {
-        const vm lanes = vm_first(pt_lanes_left(x, end));
-        const vf across = vf_load(walk->across + x), own = vi_convert(vi_sub(vi_set(column), vi_load(walk->column + x))),
-                 from[2] = {own, own + one};
-        vf px[4];
-        for (int k = 0; k < 4; k++)
-            px[k] = (from[k & 1] + vf_set(walk->places[4 * (size_t)cell[k]])) - across;
-        const vf ab = px[0] * py[1] - py[0] * px[1], be = px[1] * py[3] - py[1] * px[3], ed = px[3] * py[2] - py[3] * px[2],
-                 da = px[2] * py[0] - py[2] * px[0], bd = px[1] * py[2] - py[1] * px[2], ae = px[0] * py[3] - py[0] * px[3];
-        const vf db = zero - bd, ea = zero - ae;
-        const vf edges[4][3] = {{bd, da, ab}, {ed, db, be}, {be, ea, ab}, {ed, da, ae}};
-        for (int t = 0; t < 4; t++) {
-            if (!(taken & (uint32_t)FITS << t))
-                continue;
-            float z[3];
-            vf factors[3];
-            uint32_t cells[3];
-            for (int i = 0; i < 3; i++) {
-                cells[i] = cell[triples[t][i]];
-                z[i] = walk->places[4 * (size_t)cells[i] + 2];
-                factors[i] = factor[triples[t][i]];
-            }
-            take_face(row, x, lanes, edges[t], z, factors, cells);
-        }
+    waits->some = vm_or(waits->some, some);
+    waits->edge[0] = vf_select(some, edge_a, waits->edge[0]);
+    waits->edge[1] = vf_select(some, edge_b, waits->edge[1]);
+    waits->edge[2] = vf_select(some, edge_c, waits->edge[2]);
+    for (int i = 0; i < 3; i++) {
+        waits->z[i] = vf_select(some, *z[i], waits->z[i]);
+        waits->factor[i] = vf_select(some, *factor[i], waits->factor[i]);
+        waits->cell[i] = vi_select(some, *cell[i], waits->cell[i]);
     }
 }
 
-// All faces over a row of pixels, whose cells are in the row `cy` of cells; up: where in them.
-static void take_row(const struct walk *walk, const struct row *row, uint32_t cy, float up)
+// The two triangles of 2 x 2 cells that are whole.
+static inline __attribute__((always_inline)) void take_whole(const struct corners *c, int q, int a, float up,
+                                                             struct face *waits, struct found *best)
 {
-    const uint32_t *rect = walk->args->view.rect, *cells = walk->cells->rect;
-    const uint32_t left = walk->column[rect[0]] - 1, right = walk->column[rect[2] - 1];
-    for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
-        vf_store(row->z + x, vf_set(pt_float(PT_KEY_EMPTY_Z)));
-        for (int i = 0; i < 3; i++) {
-            vf_store(row->weight[i] + x, vf_zero());
-            vi_store(row->cell[i] + x, vi_set(0));
-        }
-    }
-    for (int k = 0; k < 2; k++) {
-        const uint32_t j = cy - 1 + (uint32_t)k;
-        if ((int32_t)j < (int32_t)cells[1] || (int32_t)j + 1 >= (int32_t)cells[3])
+    const int b = a + 1, d = a + 3, e = a + 4;
+    const vm whole = vi_eq(vi_and(c->quad[q], vi_set(WHOLE)), vi_set(WHOLE)), falling = c->falling[q];
+    if (!vm_bits(whole))
+        return;
+    const vf zero = vf_zero(), ab = edge(c, a, b), be = edge(c, b, e), ed = edge(c, e, d), da = edge(c, d, a);
+    const vf from = c->end_height[q][0] - vf_set(up), to = c->end_height[q][1] - vf_set(up);
+    const vf across = c->end_x[q][0] * to - from * c->end_x[q][1], back = zero - across; // bd or ea
+    const vf *const lower_z[3] = {&c->z[a], &c->z[b], &c->end_z[q][0]}, *const upper_z[3] = {&c->end_z[q][1], &c->z[e],
+                                                                                             &c->z[d]};
+    const vf *const lower_factor[3] = {&c->factor[a], &c->factor[b], &c->end_factor[q][0]};
+    const vf *const upper_factor[3] = {&c->end_factor[q][1], &c->factor[e], &c->factor[d]};
+    const vi *const lower_cell[3] = {&c->cell[a], &c->cell[b], &c->end_cell[q][0]};
+    const vi *const upper_cell[3] = {&c->end_cell[q][1], &c->cell[e], &c->cell[d]};
+    take_face(waits, whole, vf_select(falling, across, be), vf_select(falling, da, across), ab, lower_z, lower_factor,
+              lower_cell, best);
+    take_face(waits, whole, ed, vf_select(falling, back, da), vf_select(falling, be, back), upper_z, upper_factor, upper_cell,
+              best);
+}
+
+// Those that fit of others.
+static __attribute__((noinline)) void take_odd(const struct corners *c, int q, int a, struct face *waits, struct found *best)
+{
+    const int corner[4] = {a, a + 1, a + 3, a + 4};
+    const vm odd = vi_eq(vi_and(c->quad[q], vi_set(ODD)), vi_set(ODD));
+    if (!vm_bits(odd))
+        return;
+    for (int t = 0; t < 4; t++) {
+        const vi bit = vi_set((uint32_t)FITS << t);
+        const vm fits = vm_and(odd, vi_eq(vi_and(c->quad[q], bit), bit));
+        if (!vm_bits(fits))
             continue;
-        const uint32_t begin = (int32_t)left < (int32_t)cells[0] ? cells[0] : left;
-        for (uint32_t i = begin; i <= right && i + 1 < cells[2]; i++) {
-            const size_t at = (size_t)j * walk->cells->width + i;
-            if (!(walk->faces[at] & 15u * FITS))
-                continue;
-            const float *place = walk->places + 4 * at, *over = place + 4 * (size_t)walk->cells->width;
-            const float below = (float)(k - 1), above = (float)k;
-            const float y[4] = {(below + place[1]) - up, (below + place[5]) - up, (above + over[1]) - up,
-                                (above + over[5]) - up};
-            take_cell(walk, row, i, at, y);
-        }
+        const int k[3] = {corner[triples[t][0]], corner[triples[t][1]], corner[triples[t][2]]};
+        const vf *const z[3] = {&c->z[k[0]], &c->z[k[1]], &c->z[k[2]]};
+        const vf *const factor[3] = {&c->factor[k[0]], &c->factor[k[1]], &c->factor[k[2]]};
+        const vi *const cell[3] = {&c->cell[k[0]], &c->cell[k[1]], &c->cell[k[2]]};
+        take_face(waits, fits, edge(c, k[1], k[2]), edge(c, k[2], k[0]), edge(c, k[0], k[1]), z, factor, cell, best);
     }
 }
 
-// Whether there is a cell around those of `count` pixels.
-static int is_near(const struct walk *walk, uint32_t x, uint32_t count, uint32_t cy)
+static inline __attribute__((always_inline)) void take_quad(const struct corners *c, int q, int a, float up, struct face *waits,
+                                                            struct found *best)
 {
-    const uint32_t *cells = walk->cells->rect;
-    const int32_t left = (int32_t)walk->column[x] - 1, right = (int32_t)walk->column[x + count - 1] + 1;
-    for (int32_t j = (int32_t)cy - 1; j <= (int32_t)cy + 1; j++)
-        for (int32_t i = left < (int32_t)cells[0] ? (int32_t)cells[0] : left; i <= right && i < (int32_t)cells[2]; i++)
-            if (j >= (int32_t)cells[1] && j < (int32_t)cells[3] &&
-                walk->faces[(size_t)j * walk->cells->width + (size_t)i] & THERE)
-                return 1;
-    return 0;
+    take_whole(c, q, a, up, waits, best);
+    if (c->all & ODD)
+        take_odd(c, q, a, waits, best);
+}
+
+// All faces over pixels of one row. up: where in the cells' row.
+static void take_faces(struct corners *c, float up, struct found *best)
+{
+    struct face
+        waits; // of no pixel. Not zeros: compilers write so many by a string instruction, a quarter of the time taken here
+    waits.some = vm_of_bits(0);
+    for (int i = 0; i < 3; i++) {
+        waits.edge[i] = c->x[i];
+        waits.z[i] = c->z[i];
+        waits.factor[i] = c->factor[i];
+        waits.cell[i] = c->cell[i];
+    }
+    for (int k = 0; k < AROUND; k++)
+        c->y[k] = c->height[k] - vf_set(up);
+    take_quad(c, 0, 0, up, &waits, best);
+    take_quad(c, 1, 1, up, &waits, best);
+    take_quad(c, 2, 3, up, &waits, best);
+    take_quad(c, 3, 4, up, &waits, best);
+    if (vm_bits(waits.some))
+        show_face(&waits, best);
 }
 
 // ---- pixels ------------------------------------------------------------------------------------------------------------------------
@@ -472,30 +570,39 @@ static void show(const struct walk *walk, uint32_t x, uint32_t y, uint32_t cy, f
     }
 }
 
-static void magnify_row(const struct walk *walk, const struct row *row, uint32_t y)
+// Of a row of pixels, in cells.
+static float row_of(const struct walk *walk, uint32_t y)
+{
+    return ((float)(walk->args->view.origin_y + (int32_t)y) + 0.5f) * walk->args->inverse;
+}
+
+// PT_LANES columns of rows from y to before `end`, all in the row `cy` of cells.
+static void magnify_block(const struct walk *walk, struct cell_row *const rows[3], uint32_t x, uint32_t y, uint32_t end,
+                          uint32_t cy)
 {
     const struct magnify_args *args = walk->args;
-    const uint32_t *rect = args->view.rect;
-    const float py = ((float)(args->view.origin_y + (int32_t)y) + 0.5f) * args->inverse, up = py - floorf(py);
-    const uint32_t cy = (uint32_t)((int32_t)floorf(py) - walk->cells->origin_y);
-    take_row(walk, row, cy, up);
-    for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
-        const uint32_t count = pt_lanes_left(x, rect[2]);
-        const vm lanes = vm_first(count);
-        struct found best = {.z = vf_load(row->z + x)};
+    const uint32_t count = pt_lanes_left(x, args->view.rect[2]);
+    const vm lanes = vm_first(count);
+    struct corners corners;
+    const int near = look_around(walk, rows, x, count, &corners);
+    for (; y < end && (near || args->pass & PT_RANGE_FINE); y++) {
+        const float py = row_of(walk, y), up = py - floorf(py);
+        const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+        struct found best;
+        best.z = empty;
         for (int i = 0; i < 3; i++) {
-            best.weight[i] = vf_load(row->weight[i] + x);
-            best.cell[i] = vi_load(row->cell[i] + x);
+            best.weight[i] = empty;
+            best.cell[i] = vi_set(x);
         }
-        const vm faces = best.some = vm_and(lanes, vf_lt(best.z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
-        best.loose = vm_not(faces);
-        if (vm_bits(vm_and(lanes, best.loose)) && is_near(walk, x, count, cy)) {
-            struct corners corners;
-            look_around(walk, vi_add(vi_set(x), vi_lanes()), y, lanes, &corners);
+        if (near)
+            take_faces(&corners, up, &best);
+        best.some = vm_and(lanes, vf_lt(best.z, empty));
+        best.loose = vm_not(best.some);
+        if (near && vm_bits(vm_and(lanes, best.loose))) {
             if (!(args->pass & PT_RANGE_FINE))
                 take_places(walk, &corners, lanes, &best);
             const vm open = vm_and(lanes, vm_not(best.some));
-            for (int k = 0; k < 4 && vm_bits(open); k++)
+            for (int k = 0; k < QUADS && corners.all & LOOSE && vm_bits(open); k++)
                 take_loose(walk, &corners, k % 2 + 3 * (k / 2), open, &best);
         }
         if (vm_bits(best.some) || args->pass & PT_RANGE_FINE)
@@ -506,19 +613,31 @@ static void magnify_row(const struct walk *walk, const struct row *row, uint32_t
 static void magnify_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct walk *walk = context;
-    const size_t values = walk->thread_bytes / 7 / sizeof(float);
+    const uint32_t *rect = walk->args->view.rect;
     float *memory = (float *)(void *)(walk->memory + thread * walk->thread_bytes);
-    struct row row = {.z = memory};
-    for (uint32_t i = 0; i < 3; i++) {
-        row.weight[i] = memory + (1 + i) * values;
-        row.cell[i] = (uint32_t *)(void *)(memory + (4 + i) * values);
+    struct cell_row rows[3], *around[3];
+    for (int k = 0; k < 3; k++, memory += 6 * walk->row_values)
+        rows[k] = (struct cell_row){.y = INT32_MIN,
+                                    .divided = INT32_MIN,
+                                    .x = memory,
+                                    .y_of = memory + walk->row_values,
+                                    .z = memory + 2 * walk->row_values,
+                                    .factor = memory + 3 * walk->row_values,
+                                    .there = (uint32_t *)(void *)(memory + 4 * walk->row_values),
+                                    .quads = (uint32_t *)(void *)(memory + 5 * walk->row_values)};
+    for (uint32_t y = rect[1] + begin, last; y < rect[1] + end && !pt_cpu_cancelled(walk->call); y = last) {
+        const float cells = floorf(row_of(walk, y));
+        for (last = y + 1; last < rect[1] + end && floorf(row_of(walk, last)) <= cells;)
+            last++;
+        const int32_t cy = (int32_t)cells - walk->cells->origin_y;
+        hold(walk, rows, cy, around);
+        for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES)
+            magnify_block(walk, around, x, y, last, (uint32_t)cy);
     }
-    for (uint32_t y = begin; y < end && !pt_cpu_cancelled(walk->call); y++)
-        magnify_row(walk, &row, y + walk->args->view.rect[1]);
 }
 
 // Which cells the columns of pixels lie in.
-static void place_columns(const struct walk *walk, float *across, uint32_t *column, uint32_t *first)
+static void place_columns(const struct walk *walk, float *across, uint32_t *column)
 {
     const struct view_args *view = &walk->args->view;
     const vf half = vf_set(0.5f), inverse = vf_set(walk->args->inverse);
@@ -528,37 +647,27 @@ static void place_columns(const struct walk *walk, float *across, uint32_t *colu
         vf_store(across + x, px - floor);
         vi_store(column + x, vi_sub(vf_int(floor), vi_set((uint32_t)walk->cells->origin_x)));
     }
-    uint32_t x = 0;
-    for (uint32_t c = 0; c < walk->cells->width + 2; c++) {
-        while (x < view->width && (int32_t)column[x] < (int32_t)c)
-            x++;
-        first[c] = x;
-    }
 }
 
 int PT_KERNEL_ENTRY(magnify)(const struct pt_cpu_call *call)
 {
     const struct magnify_args *args = call->arguments;
-    const uint32_t *rect = args->view.rect, *cells = args->cells.rect;
+    const uint32_t *rect = args->view.rect;
     struct walk walk = {.call = call, .args = args, .cells = &args->cells, .places = PT_DATA(call, magnify, place)};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
-    const size_t row = ((size_t)args->view.width + 2 * PT_LANES + 15) / 16 * 16, columns = (size_t)args->cells.width + 2,
-                 faces = ((size_t)args->cells.width * args->cells.height + 63) / 64 * 64;
-    walk.thread_bytes = 7 * row * sizeof(float);
-    char *memory = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * walk.thread_bytes + (2 * row + columns) * 4 + faces);
+    const size_t row = ((size_t)args->view.width + 2 * PT_LANES + 15) / 16 * 16;
+    walk.row_values = ((size_t)args->cells.width + 2 * PAD + 3 * PT_LANES + 15) / 16 * 16;
+    walk.thread_bytes = 3 * 6 * walk.row_values * sizeof(float);
+    char *memory = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * walk.thread_bytes + 2 * row * 4);
     if (!memory)
         return PATINA_ERROR_MEMORY;
     float *across = (float *)(void *)(memory + pt_pool_threads(call->pool) * walk.thread_bytes);
-    uint32_t *column = (uint32_t *)(void *)(across + row), *first = column + row;
+    uint32_t *column = (uint32_t *)(void *)(across + row);
     walk.memory = memory;
     walk.across = across;
     walk.column = column;
-    walk.first = first;
-    walk.faces = (uint8_t *)(first + columns);
-    place_columns(&walk, across, column, first);
-    if (cells[0] < cells[2] && cells[1] < cells[3])
-        pt_parallel(call->pool, cells[3] - cells[1], 16, look_at_cells, &walk);
-    pt_parallel(call->pool, rect[3] - rect[1], 8, magnify_rows, &walk);
+    place_columns(&walk, across, column);
+    pt_parallel(call->pool, rect[3] - rect[1], BATCH, magnify_rows, &walk);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
