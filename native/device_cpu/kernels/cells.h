@@ -45,6 +45,15 @@ struct pt_cells {
     size_t thread_bytes;
 };
 
+// As pt_project has it, but for the columns.
+static inline void pt_project_rows(const struct view_args *view, const struct chunk_view *chunk, const vf p[3], vf at[3])
+{
+    for (int k = 1; k < 3; k++)
+        at[k] = vf_transform(chunk, k, p[0], p[1], p[2]);
+    if (view->perspective)
+        at[1] = at[1] * vf_rcp(at[2]);
+}
+
 // Where points [first, last) lie.
 static inline void pt_cells_project(const struct pt_cells *cells, const struct pt_cell_band *band,
                                     const struct chunk_view *chunk, uint32_t first, uint32_t last, struct pt_cell_block *block)
@@ -58,6 +67,10 @@ static inline void pt_cells_project(const struct pt_cells *cells, const struct p
     for (uint32_t i = first; i < last; i += PT_LANES) {
         vf p[3], at[3];
         pt_load_points(positions, chunk->padded, i, p);
+        pt_project_rows(view, chunk, p, at);
+        const vm own = vm_and(vf_le(window.bottom, at[1]), vf_lt(at[1], window.top));
+        if (!vm_bits(own)) // most chunks lie in several bands, whose points lie side by side
+            continue;
         pt_project(view, chunk, p, at);
         vm some = vm_and(pt_within(&window, at), vm_first(pt_lanes_left(i, last)));
         some = pt_keep_drawn(chunk, drawn, i, some);

@@ -3,6 +3,10 @@
 #include "device_cpu/kernels/cells.h"
 #include "shared/ranges.h"
 
+typedef float vf_four __attribute__((vector_size(16), aligned(4), may_alias));
+typedef int32_t vi_four __attribute__((vector_size(16), aligned(4), may_alias));
+typedef int64_t vl_four __attribute__((vector_size(32), aligned(8), may_alias));
+
 // Of a cell: weight, place across and up, share of the depth, colour 3, opacity.
 
 // To the sums of their cells.
@@ -13,7 +17,7 @@ static void add(const struct pt_cells *cells, const struct pt_cell_band *band, c
     const uint64_t *keys = PT_DATA(cells->call, merge, keys);
     const void *colors = PT_DATA(cells->call, merge, colors), *opacities = PT_DATA(cells->call, merge, opacities);
     const vf zero = vf_zero(), one = vf_set(1.0f), scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
-    float terms[PT_LANES][PT_SUMS], halves[2][PT_LANES][4];
+    float terms[2][PT_LANES][4];
     for (uint32_t i = 0; i < block->count; i += PT_LANES) {
         const vm lanes = vm_first(pt_lanes_left(i, block->count));
         const vi at = vi_load(block->cell + i), id = vi_load(block->id + i);
@@ -30,17 +34,42 @@ static void add(const struct pt_cells *cells, const struct pt_cell_band *band, c
         color[3] = pt_opacity(&args->instance, colors, opacities, id, id, some) * weight;
         for (int k = 0; k < 3; k++)
             color[k] = vf_max(vf_min(color[k], most), zero - most) * color[3];
-        vf_store4(halves[0][0], place, PT_ALL);
-        vf_store4(halves[1][0], color, PT_ALL);
-        for (uint32_t lane = 0; lane < PT_LANES; lane++)
-            for (uint32_t k = 0; k < 2; k++)
-                memcpy(terms[lane] + 4 * k, halves[k][lane], sizeof halves[k][lane]);
+        vf_store4(terms[0][0], place, PT_ALL);
+        vf_store4(terms[1][0], color, PT_ALL);
         for (uint32_t left = vm_bits(some); left; left &= left - 1) {
             const uint32_t lane = (uint32_t)__builtin_ctz(left);
             const size_t cell = block->cell[i + lane] - (size_t)band->first * view->width;
-            const vi_eight whole = __builtin_convertvector(*(const vf_eight *)(const void *)terms[lane], vi_eight);
-            *(pt_vl_eight *)(void *)(band->sums + PT_SUMS * cell) += __builtin_convertvector(whole, pt_vl_eight);
+            vl_four *sums = (vl_four *)(void *)(band->sums + PT_SUMS * cell);
+            for (int k = 0; k < 2; k++) {
+                const vi_four whole = __builtin_convertvector(*(const vf_four *)(const void *)terms[k][lane], vi_four);
+                sums[k] += __builtin_convertvector(whole, vl_four);
+            }
         }
+    }
+}
+
+// The sums of PT_LANES cells, of which `count` there are. Most fit 32 bits.
+static void take(const int64_t *from, uint32_t count, vf sums[PT_SUMS])
+{
+    int32_t narrow[PT_LANES][PT_SUMS];
+    float lanes[PT_LANES];
+    pt_vl_eight wide = {0};
+    if (count < PT_LANES)
+        memset(narrow, 0, sizeof narrow);
+    for (uint32_t i = 0; i < count; i++) {
+        const pt_vl_eight sum = *(const pt_vl_eight *)(const void *)(from + PT_SUMS * i);
+        const vi_eight low = __builtin_convertvector(sum, vi_eight);
+        memcpy(narrow[i], &low, sizeof low);
+        wide |= sum ^ __builtin_convertvector(low, pt_vl_eight);
+    }
+    if (!(wide[0] | wide[1] | wide[2] | wide[3] | wide[4] | wide[5] | wide[6] | wide[7])) {
+        pt_take_sums(narrow[0], NULL, vm_first(count), sums);
+        return;
+    }
+    for (uint32_t k = 0; k < PT_SUMS; k++) {
+        for (uint32_t i = 0; i < PT_LANES; i++)
+            lanes[i] = i < count ? pt_wide_sum(from[PT_SUMS * i + k]) : 0.0f;
+        sums[k] = vf_load(lanes);
     }
 }
 
@@ -53,13 +82,15 @@ static void save(const struct pt_cells *cells, const struct pt_cell_band *band, 
              zero = vf_zero();
     const vm lanes = vm_first(count), some = vm_and(lanes, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
     const int64_t *from = band->sums + PT_SUMS * (at - (size_t)band->first * view->width);
-    float lane_sums[PT_SUMS][PT_LANES];
-    vf sums[PT_SUMS], place[4], color[4];
-    for (uint32_t k = 0; k < PT_SUMS; k++) {
-        for (uint32_t i = 0; i < PT_LANES; i++)
-            lane_sums[k][i] = i < count ? pt_wide_sum(from[PT_SUMS * i + k]) : 0.0f;
-        sums[k] = vf_load(lane_sums[k]);
+    float *place_of = (float *)PT_DATA(cells->call, merge, place) + 4 * at,
+          *merged_of = (float *)PT_DATA(cells->call, merge, merged) + 4 * at;
+    vf sums[PT_SUMS], place[4] = {zero, zero, one, zero}, color[4] = {zero, zero, zero, zero};
+    if (!vm_bits(some)) { // as below
+        vf_store4(place_of, place, vm_bits(lanes));
+        vf_store4(merged_of, color, vm_bits(lanes));
+        return;
     }
+    take(from, count, sums);
     const vf nearest = vf_select(some, z, one), weight = vf_max(sums[0], one), inverse = vf_rcp(weight);
     const vf reach = pt_cell_reach(view, pt_range_gamma(view, args->gamma, args->gamma_cells, nearest), nearest);
     place[0] = sums[1] * inverse;
@@ -71,8 +102,8 @@ static void save(const struct pt_cells *cells, const struct pt_cell_band *band, 
     for (int k = 0; k < 3; k++)
         color[k] = vf_select(colored, sums[4 + k] * share, zero);
     color[3] = vf_select(vf_lt(sums[7], weight), vf_min(sums[7] * inverse, one), one); // opaque: 1 exactly
-    vf_store4((float *)PT_DATA(cells->call, merge, place) + 4 * at, place, vm_bits(lanes));
-    vf_store4((float *)PT_DATA(cells->call, merge, merged) + 4 * at, color, vm_bits(lanes));
+    vf_store4(place_of, place, vm_bits(lanes));
+    vf_store4(merged_of, color, vm_bits(lanes));
 }
 
 int PT_KERNEL_ENTRY(merge)(const struct pt_cpu_call *call)
