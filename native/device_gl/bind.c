@@ -115,7 +115,7 @@ int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t varia
     if (x && y) {
         d->gl.UseProgram(d->programs[kernel][variant]);
         d->gl.DispatchCompute(x, y, 1);
-        d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
+        d->gl.MemoryBarrier(PT_GL_BARRIERS);
     }
     char doing[64];
     snprintf(doing, sizeof doing, "running %s", pt_kernels[kernel].name);

@@ -57,6 +57,7 @@ static int close_context(struct pt_gl_device *d, void *unused)
             d->gl.DeleteBuffers(1, &d->scratch[i].name);
         for (int i = 0; i < 2; i++)
             d->gl.DeleteProgram(d->tile_programs[i]);
+        d->gl.DeleteProgram(d->list_program);
         d->gl.DeleteTextures(PT_UNIT_COUNT, d->textures);
         d->gl.DeleteQueries((GLsizei)d->query_count, d->queries);
         d->gl.DeleteBuffers(1, &d->arguments);

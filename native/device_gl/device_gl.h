@@ -10,6 +10,9 @@
 
 enum {
     PT_GL_VARIANTS = 128, // programs of one kernel: its passes and special cases
+    PT_GL_LIST_HEAD = 16, // bytes before a list's entries: lists.c
+    PT_GL_BARRIERS = GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
+                     GL_COMMAND_BARRIER_BIT, // behind each dispatch
 };
 
 // Memory that kernels keep between runs; grows, never shrinks.
@@ -20,11 +23,10 @@ struct pt_gl_scratch {
 
 enum pt_gl_scratch_use {
     PT_GL_SCRATCH_COUNTERS,
-    PT_GL_SCRATCH_PIXELS, // fill: this step's changes; shade: filled pixels; antialias: edges; lines: steps
-    PT_GL_SCRATCH_COLORS, // antialias: of edges; lines: discs
-    PT_GL_SCRATCH_SHADED, // lib/tail.glsl: colours before they are smoothed
-    PT_GL_SCRATCH_SHOWN,  // shade: what pixels give to a wide blend of normals
-    PT_GL_SCRATCH_SAVED,  // fill: pixels as they were before the phase
+    PT_GL_SCRATCH_PIXELS, // antialias: edges; push: what it takes; lines: steps
+    PT_GL_SCRATCH_COLORS, // lines: discs
+    PT_GL_SCRATCH_SHADED, // lib/tail.glsl: colours before they are smoothed; fill: this step's changes; antialias: colours of edges
+    PT_GL_SCRATCH_SHOWN,  // shade: what pixels give to a wide blend of normals; fill: pixels as they were before the phase
     PT_GL_SCRATCH_FILLED, // fill: a bit for each pixel filled in this phase
     PT_GL_SCRATCH_STAMPS, // fill: the step for which a tile was listed last
     PT_GL_SCRATCH_WOKEN,  // fill: tiles that the next step has to look at
@@ -32,7 +34,6 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_LARGE,  // discs: how many are large, and which
     PT_GL_SCRATCH_TILES,  // what each tile holds
     PT_GL_SCRATCH_TILE_LISTS,
-    PT_GL_SCRATCH_TILE_COUNTS,
     PT_GL_SCRATCH_SOFT_COUNTS, // soft: of each tile's list
     PT_GL_SCRATCH_SOFT_BEGINS,
     PT_GL_SCRATCH_SOFT_STATES, // soft: what pixels have come to
@@ -50,8 +51,7 @@ struct pt_gl_tiles {
     GLuint keys;
     uint32_t width, rect[4];
     uint32_t columns, rows;
-    uint32_t count[2];
-    size_t stride; // entries from list to list
+    size_t stride; // words from list to list
 };
 
 struct pt_gl_call;
@@ -80,7 +80,7 @@ struct pt_gl_device {
     GLuint programs[PT_KERNEL_COUNT][PT_GL_VARIANTS];
     char shade_definitions[PT_GL_VARIANTS][256]; // of shade's programs, shade_count of them
     uint32_t shade_count;
-    GLuint tile_programs[2];
+    GLuint tile_programs[2], list_program;
     GLuint shown; // the key plane that PT_GL_SCRATCH_SHOWN is of, as long as no kernel writes planes; else 0
     GLuint textures[PT_UNIT_COUNT];
     GLuint *queries; // timers, query_count of them
@@ -144,10 +144,21 @@ int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t o
 int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const struct view_args *view);
 void pt_gl_tiles_forget(struct pt_gl_device *d); // keys changed
 int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, enum pt_gl_tile_list list);
-// Workgroups for `count` tiles of the list bound at PT_BIND_tile_list.
-int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count);
+// Walks the list of tiles that begins there in a buffer, at most `most` of them.
+int pt_gl_dispatch_tile_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head,
+                             size_t most);
 // A grid of at least `count` workgroups, within every driver's limits.
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
+
+// lists.c
+// An empty list with room for `size` bytes of entries in this memory, bound.
+int pt_gl_list_begin(struct pt_gl_device *d, enum pt_gl_scratch_use use, uint32_t binding, size_t size);
+// Writes into the heads of `count` lists that are bound there, `stride` bytes apart, how many workgroups walk them: `parts` for each
+// so many `entries`.
+int pt_gl_list_groups(struct pt_gl_device *d, uint32_t binding, uint32_t count, size_t stride, uint32_t entries,
+                      uint32_t parts);
+// As many workgroups as a head in a buffer says.
+int pt_gl_list_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head);
 
 // The lights of a program with lib/phong.glsl.
 void pt_gl_set_lights(struct pt_gl_device *d, GLuint program, const struct shade_args *args);

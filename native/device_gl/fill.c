@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// fill's runner: find, decide and apply, then mark and restore, each until nothing changes. Reading the counts back
-// between them is what lets a phase stop early, and keeps lists and dispatches no longer than needed.
+// fill's runner: find, decide and apply, then mark and restore, as often as the plan allows. How long its lists are stays in a buffer, and
+// a dispatch takes its workgroups from there: steps behind the last that changed something walk nothing, and nobody waits for a count.
 #include "device_gl.h"
 #include "shared/filling.h"
 
 enum {
-    ENTRY_GROUP = 64, // as in fill.comp
-    CHANGE_SIZE = 16, // struct change
-    SAVED_SIZE = 20,  // struct saved_pixel
-    LEAST_ENTRIES = 1 << 16,
+    CHANGE_SIZE = 16, // struct change, struct saved_pixel
 };
 
-enum program { FIND_EMPTY, FIND_OCCLUDED, FIND_COARSE, DECIDE, APPLY, WAKE, MARK, RESTORE, SELECT };
+enum program { FIND_EMPTY, FIND_OCCLUDED, FIND_COARSE, DECIDE, APPLY, WAKE, MARK, RESTORE, SELECT, COUNT };
 
-struct counters {
-    uint32_t changed, saved, woken;
-};
+// Heads of lists in fill.comp's walks: who walks what.
+enum { CHANGES, APPLIES, SAVES, TILES, LOOKS, WALKS };
+
+// What COUNT knows beforehand.
+enum { FOUND, WOKEN, SAVED, MARKED, SELECTED };
 
 struct fill {
     struct pt_gl_device *d;
@@ -24,15 +23,12 @@ struct fill {
     uint32_t phase; // PT_FILL_*
     enum program find;
     int first; // the first of its steps looks everywhere
-    struct counters counters;
 };
 
-static int bind_scratch(struct fill *f, uint32_t binding, enum pt_gl_scratch_use use, size_t size, size_t keep)
+static int bind_scratch(struct fill *f, uint32_t binding, enum pt_gl_scratch_use use, size_t size)
 {
-    int result = pt_gl_scratch(f->d, use, size, keep);
-    const struct pt_gl_scratch *scratch = &f->d->scratch[use];
-    size_t bound = scratch->size < f->d->block_size ? scratch->size : f->d->block_size & ~(size_t)15;
-    return result == PATINA_OK ? pt_gl_bind(f->d, binding, scratch->name, 0, size > bound ? size : bound, "fill") : result;
+    const int result = pt_gl_scratch(f->d, use, size, 0);
+    return result == PATINA_OK ? pt_gl_bind(f->d, binding, f->d->scratch[use].name, 0, size, "fill") : result;
 }
 
 static int programs(struct fill *f)
@@ -45,163 +41,138 @@ static int programs(struct fill *f)
                                               "#define STEP 3\n",
                                               "#define STEP 4\n",
                                               "#define STEP 5\n",
-                                              "#define STEP 6\n"};
+                                              "#define STEP 6\n",
+                                              "#define STEP 7\n"};
     int result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, f->find, definitions[f->find]);
-    for (uint32_t p = DECIDE; p <= (f->args->unfills ? SELECT : WAKE) && result == PATINA_OK; p++)
-        result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, p, definitions[p]);
+    for (uint32_t p = DECIDE; p <= COUNT && result == PATINA_OK; p++)
+        if (f->args->unfills || p <= WAKE || p == COUNT)
+            result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, p, definitions[p]);
     return result;
 }
 
+// Room for the lists if every pixel changes.
 static int prepare(struct fill *f)
 {
+    static const uint32_t none[WALKS * PT_GL_LIST_HEAD / 4];
     const struct view_args *view = &f->args->view;
     const GladGLContext *gl = &f->d->gl;
     // an empty pixel is filled once, but what was there before says what is a stray
     int refills = f->args->unfills && (f->phase == PT_FILL_OCCLUDED || f->args->alone);
     size_t bits = ((size_t)view->width * view->height + 31) / 32 * 4;
     size_t tiles = (size_t)f->d->tiles.columns * f->d->tiles.rows * 4;
+    size_t changes = (size_t)(view->rect[2] - view->rect[0]) * (view->rect[3] - view->rect[1]) * CHANGE_SIZE;
     int result = programs(f);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_counters, PT_GL_SCRATCH_COUNTERS, sizeof f->counters, 0);
+        result = bind_scratch(f, PT_BIND_fill_walks, PT_GL_SCRATCH_COUNTERS, sizeof none);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_PIXELS, LEAST_ENTRIES * CHANGE_SIZE, 0);
+        result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_SHADED, changes);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_saved, PT_GL_SCRATCH_SAVED, f->args->unfills ? LEAST_ENTRIES * SAVED_SIZE : 16,
-                              0);
+        result = bind_scratch(f, PT_BIND_fill_saved, PT_GL_SCRATCH_SHOWN, f->args->unfills ? changes : 16);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_filled, PT_GL_SCRATCH_FILLED, refills ? bits : 16, 0);
+        result = bind_scratch(f, PT_BIND_fill_filled, PT_GL_SCRATCH_FILLED, refills ? bits : 16);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_stamps, PT_GL_SCRATCH_STAMPS, tiles, 0);
+        result = bind_scratch(f, PT_BIND_fill_stamps, PT_GL_SCRATCH_STAMPS, tiles);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_woken, PT_GL_SCRATCH_WOKEN, tiles, 0);
-    if (result != PATINA_OK || !refills)
+        result = pt_gl_list_begin(f->d, PT_GL_SCRATCH_WOKEN, PT_BIND_fill_woken, tiles);
+    if (result != PATINA_OK)
         return result;
-    gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_FILLED].name);
-    gl->ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)bits, GL_RED_INTEGER, GL_UNSIGNED_INT, NULL);
+    gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name);
+    gl->BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, none);
+    if (refills) {
+        gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_FILLED].name);
+        gl->ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)bits, GL_RED_INTEGER, GL_UNSIGNED_INT, NULL);
+    }
     return pt_gl_check(f->d, "preparing to fill holes");
 }
 
-static void write_counters(struct fill *f)
+// Takes what a head says.
+static int walk(struct fill *f, enum program p, uint32_t head)
 {
-    f->d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name);
-    f->d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof f->counters, &f->counters);
-}
-
-static int read_counters(struct fill *f)
-{
-    f->d->gl.BindBuffer(GL_COPY_READ_BUFFER, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name);
-    f->d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof f->counters, &f->counters);
-    return pt_gl_check(f->d, "counting filled pixels");
-}
-
-static int dispatch_entries(struct fill *f, enum program p, uint32_t entries)
-{
-    GLuint program = f->d->programs[PT_KERNEL_fill][p];
-    uint32_t x, y;
-    pt_gl_grid((entries + ENTRY_GROUP - 1) / ENTRY_GROUP, &x, &y);
-    f->d->gl.ProgramUniform1ui(program, 0, entries);
+    const GLuint program = f->d->programs[PT_KERNEL_fill][p];
     if (p == APPLY || p == WAKE || p == RESTORE || p == SELECT)
         f->d->gl.ProgramUniform1ui(program, 1, f->d->stamp);
     if (p == APPLY || p == RESTORE || p == SELECT)
         f->d->gl.ProgramUniform1ui(program, 2, f->d->tiles.columns);
     if (p == DECIDE || p == APPLY || p == MARK)
         f->d->gl.ProgramUniform1ui(program, 5, f->phase);
-    return pt_gl_dispatch(f->d, PT_KERNEL_fill, p, x, y);
+    return pt_gl_list_dispatch(f->d, PT_KERNEL_fill, p, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name, head * PT_GL_LIST_HEAD);
 }
 
-static int find_once(struct fill *f, uint32_t woken)
+static int count(struct fill *f, uint32_t known)
 {
+    const GLuint program = f->d->programs[PT_KERNEL_fill][COUNT];
+    f->d->gl.ProgramUniform1ui(program, 0, known);
+    f->d->gl.ProgramUniform1ui(program, 3, f->d->tiles.columns * f->d->tiles.rows);
+    return pt_gl_dispatch(f->d, PT_KERNEL_fill, COUNT, 1, 1);
+}
+
+static int find(struct fill *f)
+{
+    const size_t tiles = (size_t)f->d->tiles.columns * f->d->tiles.rows;
     if (f->first)
         return pt_gl_dispatch_tiles(f->d, PT_KERNEL_fill, f->find,
                                     f->find == FIND_EMPTY ? PT_GL_TILES_RIM : PT_GL_TILES_POINTS);
-    int result = bind_scratch(f, PT_BIND_tile_list, PT_GL_SCRATCH_WOKEN, woken * (size_t)4, 0);
-    return result == PATINA_OK ? pt_gl_dispatch_list(f->d, PT_KERNEL_fill, f->find, woken) : result;
-}
-
-// Until the list holds all that is to change; counters.changed says how many.
-static int find(struct fill *f)
-{
-    uint32_t woken = f->counters.woken;
-    for (;;) {
-        size_t size = f->d->scratch[PT_GL_SCRATCH_PIXELS].size;
-        uint32_t room = (uint32_t)((size < f->d->block_size ? size : f->d->block_size) / CHANGE_SIZE);
-        f->counters.changed = f->counters.woken = 0;
-        write_counters(f);
-        f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][f->find], 0, room);
-        int result = find_once(f, woken);
-        if (result == PATINA_OK)
-            result = read_counters(f);
-        if (result != PATINA_OK || f->counters.changed <= room)
-            return result;
-        result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_PIXELS, (size_t)f->counters.changed * CHANGE_SIZE, 0);
-        if (result != PATINA_OK)
-            return result;
-    }
+    return pt_gl_dispatch_tile_list(f->d, PT_KERNEL_fill, f->find, f->d->scratch[PT_GL_SCRATCH_WOKEN].name, 0, tiles);
 }
 
 static int fill_step(struct fill *f)
 {
-    int result = find(f), all_new = f->first || f->phase == PT_FILL_BACKGROUND;
-    uint32_t changed = f->counters.changed, kept = f->counters.saved, tiles = f->d->tiles.columns * f->d->tiles.rows;
-    f->first = 0;
+    int result = find(f);
     f->d->stamp++;
-    if (result != PATINA_OK || !changed)
-        return result;
-    if (f->phase == PT_FILL_BACKGROUND) // the other phase touches no empty pixel
-        pt_gl_tiles_forget(f->d);
-    if (f->args->unfills)
-        result = bind_scratch(f, PT_BIND_fill_saved, PT_GL_SCRATCH_SAVED, ((size_t)kept + changed) * SAVED_SIZE,
-                              (size_t)kept * SAVED_SIZE);
-    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][DECIDE], 3, (GLuint)all_new);
-    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][DECIDE], 4, kept);
     if (result == PATINA_OK)
-        result = dispatch_entries(f, DECIDE, changed);
+        result = count(f, FOUND);
     if (result == PATINA_OK)
-        result = dispatch_entries(f, APPLY, changed);
+        result = walk(f, DECIDE, CHANGES);
     if (result == PATINA_OK)
-        result = dispatch_entries(f, WAKE, tiles);
-    if (result == PATINA_OK)
-        result = read_counters(f);
-    if (all_new && f->args->unfills)
-        f->counters.saved = kept + changed;
-    if (!f->counters.woken) // nothing reached any of them
-        f->counters.changed = 0;
-    return result;
+        result = walk(f, APPLY, APPLIES);
+    if (result == PATINA_OK) {
+        f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][WAKE], 3, f->d->tiles.columns * f->d->tiles.rows);
+        result = walk(f, WAKE, TILES);
+    }
+    return result == PATINA_OK ? count(f, WOKEN) : result;
+}
+
+// Whether the list of a head is empty: in software, which has done its work, so looking has nobody wait, and steps over nothing take time.
+static int is_over(struct fill *f, enum pt_gl_scratch_use use, uint32_t head)
+{
+    uint32_t walk[PT_GL_LIST_HEAD / 4];
+    if (f->d->base.info.hardware)
+        return 0;
+    f->d->gl.BindBuffer(GL_COPY_READ_BUFFER, f->d->scratch[use].name);
+    f->d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, head * PT_GL_LIST_HEAD, sizeof walk, walk);
+    return !walk[3];
 }
 
 static int unfill_step(struct fill *f)
 {
-    uint32_t look = f->first ? f->counters.saved : f->counters.woken;
-    int result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_PIXELS, (size_t)f->counters.saved * CHANGE_SIZE, 0);
-    f->counters.changed = f->counters.woken = 0;
-    write_counters(f);
-    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][MARK], 3, (GLuint)f->first);
-    f->first = 0;
-    if (result == PATINA_OK)
-        result = dispatch_entries(f, MARK, look);
-    if (result == PATINA_OK)
-        result = read_counters(f);
-    if (result != PATINA_OK || !f->counters.changed)
-        return result;
+    int result = f->first ? count(f, SAVED) : PATINA_OK;
     f->d->stamp++;
-    result = dispatch_entries(f, RESTORE, f->counters.changed);
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][MARK], 3, (GLuint)f->first);
     if (result == PATINA_OK)
-        result = dispatch_entries(f, SELECT, f->counters.saved);
-    return result == PATINA_OK ? read_counters(f) : result;
+        result = walk(f, MARK, f->first ? SAVES : LOOKS);
+    if (result == PATINA_OK)
+        result = count(f, MARKED);
+    if (result == PATINA_OK)
+        result = walk(f, RESTORE, CHANGES);
+    if (result == PATINA_OK)
+        result = walk(f, SELECT, SAVES);
+    return result == PATINA_OK ? count(f, SELECTED) : result;
 }
 
-// Repeats a step until nothing changes, `most` times at the most.
 static int repeat(struct fill *f, int (*step)(struct fill *), uint32_t most)
 {
+    int result = PATINA_OK;
     f->first = 1;
-    for (uint32_t i = 0; i < most; i++) {
+    for (uint32_t i = 0; i < most && result == PATINA_OK; i++) {
         if (f->cancel && atomic_load(f->cancel))
             return pt_gl_fail(f->d, PATINA_ERROR_CANCELLED, "cancelled");
-        int result = step(f);
-        if (result != PATINA_OK || !f->counters.changed)
-            return result;
+        result = step(f);
+        f->first = 0;
+        if (result == PATINA_OK &&
+            (step == fill_step ? is_over(f, PT_GL_SCRATCH_WOKEN, 0) : is_over(f, PT_GL_SCRATCH_COUNTERS, LOOKS)))
+            break;
     }
-    return PATINA_OK;
+    return result;
 }
 
 static int run_phase(struct pt_gl_device *d, const struct fill_args *args, uint32_t phase, const atomic_int *cancel)
@@ -209,14 +180,12 @@ static int run_phase(struct pt_gl_device *d, const struct fill_args *args, uint3
     struct fill f = {.d = d, .args = args, .phase = phase, .cancel = cancel, .find = FIND_EMPTY};
     if (phase == PT_FILL_OCCLUDED)
         f.find = args->view.level ? FIND_COARSE : FIND_OCCLUDED;
-    if (!d->tiles.count[PT_GL_TILES_POINTS] && !d->tiles.count[PT_GL_TILES_RIM])
-        return PATINA_OK;
     int result = prepare(&f);
     if (result == PATINA_OK)
         result = repeat(&f, fill_step, args->iterations);
-    if (result == PATINA_OK && f.counters.saved)
-        result = repeat(&f, unfill_step, args->unfills);
-    return result;
+    if (phase == PT_FILL_BACKGROUND) // the other phase touches no empty pixel
+        pt_gl_tiles_forget(d);
+    return result == PATINA_OK ? repeat(&f, unfill_step, args->unfills) : result;
 }
 
 int pt_gl_fill(struct pt_gl_device *d, const struct pt_gl_work *work)

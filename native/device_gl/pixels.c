@@ -11,39 +11,21 @@
 
 enum { TILE_PIXELS = 64, GROUP = 64, TAKEN_EACH = 4 }; // TAKEN_EACH: as in push.comp
 
-// Room for as many pixels as the tiles hold; counts from nothing. Both bound.
-static int prepare_list(struct pt_gl_device *d, uint32_t counter_binding, uint32_t list_binding, uint32_t tile_pixels)
+// A list of pixels, bound there, that `find` fills while it walks the tiles with points; then it is known how many workgroups walk it,
+// `entries` each.
+static int make_list(struct pt_gl_device *d, uint32_t binding, uint32_t tile_pixels, enum pt_kernel kernel, uint32_t find,
+                     uint32_t entries)
 {
-    static const uint32_t none;
-    size_t size = (size_t)d->tiles.count[PT_GL_TILES_POINTS] * tile_pixels * 4;
-    int result = pt_gl_scratch(d, PT_GL_SCRATCH_COUNTERS, sizeof none, 0);
+    const size_t tiles = (size_t)d->tiles.columns * d->tiles.rows;
+    int result = pt_gl_list_begin(d, PT_GL_SCRATCH_PIXELS, binding, tiles * tile_pixels * 4);
     if (result == PATINA_OK)
-        result = pt_gl_scratch(d, PT_GL_SCRATCH_PIXELS, size, 0);
-    if (result == PATINA_OK)
-        result = pt_gl_bind(d, counter_binding, d->scratch[PT_GL_SCRATCH_COUNTERS].name, 0, sizeof none, "a list");
-    if (result == PATINA_OK)
-        result = pt_gl_bind(d, list_binding, d->scratch[PT_GL_SCRATCH_PIXELS].name, 0, size, "a list");
-    if (result != PATINA_OK)
-        return result;
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_COUNTERS].name);
-    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, &none);
-    return PATINA_OK;
+        result = pt_gl_dispatch_tiles(d, kernel, find, PT_GL_TILES_POINTS);
+    return result == PATINA_OK ? pt_gl_list_groups(d, binding, 1, 0, entries, 1) : result;
 }
 
-static uint32_t list_length(struct pt_gl_device *d)
+static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant)
 {
-    uint32_t count = 0;
-    d->gl.BindBuffer(GL_COPY_READ_BUFFER, d->scratch[PT_GL_SCRATCH_COUNTERS].name);
-    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof count, &count);
-    return count;
-}
-
-static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count, uint32_t group)
-{
-    uint32_t x, y;
-    pt_gl_grid((count + group - 1) / group, &x, &y);
-    d->gl.ProgramUniform1ui(d->programs[kernel][variant], 0, count);
-    return pt_gl_dispatch(d, kernel, variant, x, y);
+    return pt_gl_list_dispatch(d, kernel, variant, d->scratch[PT_GL_SCRATCH_PIXELS].name, 0);
 }
 
 // ---- shade -----------------------------------------------------------------------------------------------------
@@ -144,8 +126,6 @@ int pt_gl_shade(struct pt_gl_device *d, const struct pt_gl_work *work)
     const struct pt_buffer *shading = work->buffers[PT_BUF_shade_shading];
     char definitions[sizeof d->shade_definitions[0]];
     uint32_t variant;
-    if (!d->tiles.count[PT_GL_TILES_POINTS])
-        return PATINA_OK;
     shade_definitions(args, shading && shading->name, definitions, sizeof definitions);
     int result = shade_program(d, definitions, &variant);
     if (result == PATINA_OK && args->blend > 1)
@@ -162,10 +142,9 @@ enum { FIND = 0, MIX = 1, APPLY = 2 };
 int pt_gl_antialias(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     const struct antialias_args *args = work->arguments;
-    const uint32_t variant = 3 * args->behind + 6 * args->inked;
+    const uint32_t variant = 3 * args->behind + 6 * args->inked, *rect = args->view.rect;
+    const size_t size = (size_t)(rect[2] - rect[0]) * (rect[3] - rect[1]) * 16; // if all were edges
     int result = PATINA_OK;
-    if (!d->tiles.count[PT_GL_TILES_POINTS])
-        return PATINA_OK;
     for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step++) {
         char definitions[64];
         snprintf(definitions, sizeof definitions, "#define STEP %u\n#define BEHIND %u\n#define INKED %u\n", step, args->behind,
@@ -173,21 +152,14 @@ int pt_gl_antialias(struct pt_gl_device *d, const struct pt_gl_work *work)
         result = pt_gl_kernel_program(d, PT_KERNEL_antialias, variant + step, definitions);
     }
     if (result == PATINA_OK)
-        result = prepare_list(d, PT_BIND_antialias_counters, PT_BIND_antialias_edges, TILE_PIXELS);
+        result = pt_gl_scratch(d, PT_GL_SCRATCH_SHADED, size, 0);
     if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, variant + FIND, PT_GL_TILES_POINTS);
-    if (result != PATINA_OK)
-        return result;
-    uint32_t count = list_length(d);
-    result = pt_gl_scratch(d, PT_GL_SCRATCH_COLORS, (size_t)count * 16, 0);
-    if (result == PATINA_OK && count)
-        result = pt_gl_bind(d, PT_BIND_antialias_mixed, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16,
-                            "antialias");
+        result = pt_gl_bind(d, PT_BIND_antialias_mixed, d->scratch[PT_GL_SCRATCH_SHADED].name, 0, size, "antialias");
     if (result == PATINA_OK)
-        result = dispatch_list(d, PT_KERNEL_antialias, variant + MIX, count, GROUP);
+        result = make_list(d, PT_BIND_antialias_edges, TILE_PIXELS, PT_KERNEL_antialias, variant + FIND, GROUP);
     if (result == PATINA_OK)
-        result = dispatch_list(d, PT_KERNEL_antialias, variant + APPLY, count, GROUP);
-    return result;
+        result = dispatch_list(d, PT_KERNEL_antialias, variant + MIX);
+    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_antialias, variant + APPLY) : result;
 }
 
 // ---- smooth, antialias and compose as one -----------------------------------------------------------------
@@ -235,18 +207,14 @@ int pt_gl_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, const
     int result = pt_gl_clear(d, combined, 0, combined->size, words, sizeof words);
     if (result == PATINA_OK)
         result = pt_gl_tiles(d, passes[0].buffers[PT_BUF_smooth_keys], &args.smooth.view);
-    if (result != PATINA_OK || !d->tiles.count[PT_GL_TILES_POINTS])
-        return result;
     for (uint32_t i = find; i < find + 2 && result == PATINA_OK; i++)
         if (!d->programs[PT_KERNEL_compose][TAIL + i])
             result = pt_gl_program(d, "lib/tail.glsl", definitions[i], &d->programs[PT_KERNEL_compose][TAIL + i]);
     if (result == PATINA_OK)
         result = bind_tail(d, &args, passes, shaded);
     if (result == PATINA_OK)
-        result = prepare_list(d, PT_BIND_tail_counters, PT_BIND_tail_edges, TILE_PIXELS);
-    if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_compose, TAIL + find, PT_GL_TILES_POINTS);
-    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_compose, TAIL + find + 1, list_length(d), GROUP) : result;
+        result = make_list(d, PT_BIND_tail_edges, TILE_PIXELS, PT_KERNEL_compose, TAIL + find, GROUP);
+    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_compose, TAIL + find + 1) : result;
 }
 
 // ---- push ------------------------------------------------------------------------------------------------------
@@ -269,15 +237,11 @@ int pt_gl_push(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     (void)work;
     int result = pt_gl_kernel_program(d, PT_KERNEL_push, COVERED, "#define STEP 0\n");
-    if (!d->tiles.count[PT_GL_TILES_POINTS])
-        return PATINA_OK;
     if (result == PATINA_OK)
         result = pt_gl_kernel_program(d, PT_KERNEL_push, TAKE, "#define STEP 1\n");
-    if (result == PATINA_OK)
-        result = prepare_list(d, PT_BIND_push_counters, PT_BIND_push_taken, 4 * TILE_PIXELS);
     if (result == PATINA_OK) // a tile has twice the columns of a tile of its own level
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_push, COVERED, PT_GL_TILES_POINTS);
-    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_push, TAKE, list_length(d), TAKEN_EACH * GROUP) : result;
+        result = make_list(d, PT_BIND_push_taken, 4 * TILE_PIXELS, PT_KERNEL_push, COVERED, TAKEN_EACH * GROUP);
+    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_push, TAKE) : result;
 }
 
 // ---- lines -----------------------------------------------------------------------------------------------------

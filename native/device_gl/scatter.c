@@ -61,32 +61,27 @@ static int bind_batch(struct pt_gl_device *d, const struct instance_buffers *b, 
     return result;
 }
 
+static uint32_t large_binding(const struct instance_buffers *b)
+{
+    return b->work->kernel == PT_KERNEL_splat ? PT_BIND_splat_large : PT_BIND_blend_large;
+}
+
 // The discs that a run listed as large: its own program draws them.
 static int run_large(struct pt_gl_device *d, const struct instance_buffers *b, const struct batch *batch)
 {
     const GLuint program = d->programs[b->work->kernel][b->large];
-    uint32_t count = 0, x, y;
-    d->gl.BindBuffer(GL_COPY_READ_BUFFER, d->scratch[PT_GL_SCRATCH_LARGE].name);
-    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof count, &count);
-    pt_gl_grid(count * b->parts, &x, &y);
+    const int result = pt_gl_list_groups(d, large_binding(b), 1, 0, 1, b->parts);
     d->gl.ProgramUniform1ui(program, 1, (GLuint)batch->first_slot);
     d->gl.ProgramUniform1ui(program, 5, b->parts);
-    return pt_gl_dispatch(d, b->work->kernel, b->large, x, y);
+    return result == PATINA_OK ? pt_gl_list_dispatch(d, b->work->kernel, b->large, d->scratch[PT_GL_SCRATCH_LARGE].name, 0)
+                               : result;
 }
 
 // Makes room for the large discs of a run.
 static int begin_large(struct pt_gl_device *d, const struct instance_buffers *b)
 {
-    const uint32_t none = 0;
     const uint64_t slots = slots_of(b), most = (uint64_t)DISC_RUN * CHUNK_MOST;
-    const size_t size = 4 + 8 * (size_t)(slots < most ? slots : most);
-    const uint32_t large = b->work->kernel == PT_KERNEL_splat ? PT_BIND_splat_large : PT_BIND_blend_large;
-    int result = pt_gl_scratch(d, PT_GL_SCRATCH_LARGE, size, 0);
-    if (result == PATINA_OK)
-        result = pt_gl_bind(d, large, d->scratch[PT_GL_SCRATCH_LARGE].name, 0, size, pt_kernels[b->work->kernel].name);
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_LARGE].name);
-    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, &none);
-    return result;
+    return pt_gl_list_begin(d, PT_GL_SCRATCH_LARGE, large_binding(b), 8 * (size_t)(slots < most ? slots : most));
 }
 
 static int run_batch(struct pt_gl_device *d, const struct instance_buffers *b, const struct batch *batch, uint32_t pass)

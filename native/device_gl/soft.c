@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Runners of soft points: gather, and soft, whose tiles are drawn in batches as large as their lists fit the bins.
+// Runners of soft points: gather, and soft, whose tiles are drawn in batches as large as their lists fit the bins. For these their lengths are
+// read back, once a run.
 #include "device_gl.h"
 #include "shared/balls.h"
 
@@ -127,12 +128,18 @@ static int sort_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t 
     return result;
 }
 
-// In parts, until no pixel is left unfinished.
+// In parts: of discs as many as the longest list has; balls, whose steps nobody knows beforehand, until no pixel is left unfinished.
 static int draw_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end)
 {
     const GLuint flag = d->scratch[PT_GL_SCRATCH_COUNTERS].name;
+    const uint32_t most = longest(soft, first, end);
     uint32_t unfinished = 1;
     int result = PATINA_OK;
+    if (PT_SOFT_DISCS(soft->model) && !soft->args->veils) {
+        for (uint32_t part = 0; (!part || part * PT_SOFT_PART < most) && result == PATINA_OK; part++)
+            result = run_tiles(d, soft, soft->draw, first, end, part);
+        return result;
+    }
     for (uint32_t part = 0; unfinished && result == PATINA_OK; part++) {
         clear(d, flag, sizeof unfinished);
         result = run_tiles(d, soft, soft->draw, first, end, part);

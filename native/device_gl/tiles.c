@@ -31,28 +31,25 @@ static int programs(struct pt_gl_device *d)
 static int room(struct pt_gl_device *d, struct pt_gl_tiles *t)
 {
     size_t tiles = (size_t)t->columns * t->rows;
-    t->stride = (tiles + 63) & ~(size_t)63; // a list begins where a block may begin
+    t->stride = (PT_GL_LIST_HEAD / 4 + tiles + 63) & ~(size_t)63; // a list begins where a block may begin
     int result = pt_gl_scratch(d, PT_GL_SCRATCH_TILES, tiles * 4, 0);
     if (result == PATINA_OK)
         result = pt_gl_scratch(d, PT_GL_SCRATCH_TILE_LISTS, LISTS * t->stride * 4, 0);
-    if (result == PATINA_OK)
-        result = pt_gl_scratch(d, PT_GL_SCRATCH_TILE_COUNTS, sizeof t->count, 0);
     return result;
 }
 
 static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
 {
-    static const uint32_t none[LISTS];
+    static const uint32_t none[PT_GL_LIST_HEAD / 4];
     const GladGLContext *gl = &d->gl;
     const struct pt_gl_scratch *s = d->scratch;
     size_t tiles = (size_t)t->columns * t->rows;
-    gl->BindBuffer(GL_COPY_WRITE_BUFFER, s[PT_GL_SCRATCH_TILE_COUNTS].name);
-    gl->BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, none);
+    gl->BindBuffer(GL_COPY_WRITE_BUFFER, s[PT_GL_SCRATCH_TILE_LISTS].name);
+    for (int i = 0; i < LISTS; i++)
+        gl->BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)(i * t->stride * 4), sizeof none, none);
     int result = pt_gl_bind(d, PT_BIND_tile_lists_tiles, s[PT_GL_SCRATCH_TILES].name, 0, tiles * 4, "tiles");
     if (result == PATINA_OK)
         result = pt_gl_bind(d, PT_BIND_tile_lists_lists, s[PT_GL_SCRATCH_TILE_LISTS].name, 0, LISTS * t->stride * 4, "tiles");
-    if (result == PATINA_OK)
-        result = pt_gl_bind(d, PT_BIND_tile_lists_counts, s[PT_GL_SCRATCH_TILE_COUNTS].name, 0, sizeof none, "tiles");
     if (result != PATINA_OK)
         return result;
     for (int i = 0; i < 2; i++) {
@@ -67,9 +64,7 @@ static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
         gl->DispatchCompute(x, y, 1);
         gl->MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
     }
-    gl->BindBuffer(GL_COPY_READ_BUFFER, s[PT_GL_SCRATCH_TILE_COUNTS].name);
-    gl->GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof t->count, t->count);
-    return pt_gl_check(d, "looking for tiles with points");
+    return pt_gl_list_groups(d, PT_BIND_tile_lists_lists, LISTS, t->stride * 4, GROUP / TILE, 1);
 }
 
 int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const struct view_args *view)
@@ -97,19 +92,15 @@ int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const stru
 int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, enum pt_gl_tile_list list)
 {
     const struct pt_gl_tiles *t = &d->tiles;
-    if (!t->count[list])
-        return PATINA_OK;
-    int result = pt_gl_bind(d, PT_BIND_tile_list, d->scratch[PT_GL_SCRATCH_TILE_LISTS].name, list * t->stride * 4,
-                            t->count[list] * (size_t)4, "tiles");
-    return result == PATINA_OK ? pt_gl_dispatch_list(d, kernel, variant, t->count[list]) : result;
+    const size_t tiles = (size_t)t->columns * t->rows, head = list * t->stride * 4;
+    return tiles ? pt_gl_dispatch_tile_list(d, kernel, variant, d->scratch[PT_GL_SCRATCH_TILE_LISTS].name, head, tiles)
+                 : PATINA_OK;
 }
 
-int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count)
+int pt_gl_dispatch_tile_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head,
+                             size_t most)
 {
-    GLuint program = d->programs[kernel][variant];
-    uint32_t x, y;
-    pt_gl_grid((count + GROUP / TILE - 1) / (GROUP / TILE), &x, &y);
-    d->gl.ProgramUniform1ui(program, 14, count);
-    d->gl.ProgramUniform1ui(program, 15, d->tiles.columns);
-    return pt_gl_dispatch(d, kernel, variant, x, y);
+    const int result = pt_gl_bind(d, PT_BIND_tile_list, name, head, PT_GL_LIST_HEAD + 4 * most, "tiles");
+    d->gl.ProgramUniform1ui(d->programs[kernel][variant], 15, d->tiles.columns);
+    return result == PATINA_OK ? pt_gl_list_dispatch(d, kernel, variant, name, head) : result;
 }

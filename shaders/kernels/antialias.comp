@@ -24,8 +24,7 @@ layout(std430, binding = BIND_from) buffer from_block { uint from[]; };
 layout(std430, binding = BIND_color) writeonly buffer color_block { vec4 color[]; };
 layout(std430, binding = BIND_through) readonly buffer through_block { float through[]; };
 layout(std430, binding = BIND_line) readonly buffer line_block { float line[]; };
-layout(std430, binding = BIND_counters) buffer counters_block { uint edge_count; };
-layout(std430, binding = BIND_edges) buffer edges_block { uint edges[]; };
+layout(std430, binding = BIND_edges) buffer edges_block { uint edge_groups[3], edge_count, edges[]; };
 layout(std430, binding = BIND_mixed) buffer mixed_block { vec4 mixed[]; };
 
 #include "lib/edges.glsl"
@@ -83,8 +82,6 @@ void main()
 
 #else
 
-layout(location = 0) uniform uint entries;
-
 uint entry_index()
 {
     return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
@@ -97,7 +94,7 @@ void main()
     bool layers = args.layers != 0u;
     ivec2 size = ivec2(args.view.width, args.view.height);
     uint index = entry_index();
-    if (index >= entries)
+    if (index >= edge_count)
         return;
     uint at = edges[index], z_bits = read_z_bits(at);
     uvec2 pixel = pt_pixel(at, uint(size.x));
@@ -124,7 +121,7 @@ void main()
 void main()
 {
     uint index = entry_index();
-    if (index >= entries)
+    if (index >= edge_count)
         return;
     uint at = edges[index];
     color[at] = mixed[index];

@@ -8,16 +8,20 @@
 // it never shows.
 //   STEP 0: find the pixels to fill, empty or OCCLUDED ones (2: above level 0);   STEP 1: what they become;
 //   STEP 2: apply;   STEP 3: the tiles for the next step;
-//   STEP 4: mark;   STEP 5: restore;   STEP 6: the entries for the next step
+//   STEP 4: mark;   STEP 5: restore;   STEP 6: the entries for the next step;   STEP 7: how many workgroups walk what
 #version 430 core
 #include "shared/filling.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #if STEP == 0
 #include "lib/tiles.glsl"
+#elif STEP == 7
+layout(local_size_x = 1) in;
 #else
 layout(local_size_x = 64) in;
 #endif
+
+#define EACH 4u // entries an invocation applies
 
 struct change {
     uint pixel, id, z, from;
@@ -25,24 +29,26 @@ struct change {
 
 struct saved_pixel { // as it was before the phase
     uint pixel, id, z, from;
-    float threshold; // a neighbour nearer than this was dark
+};
+
+struct walk { // as an indirect dispatch takes it, and how many there are
+    uint x, y, z, count;
 };
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { fill_args args; };
 layout(std430, binding = BIND_keys) writeonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = BIND_from) writeonly buffer from_block { uint from[]; };
-layout(std430, binding = BIND_counters) buffer counters_block { uint changed_count, saved_count, woken_count; };
+layout(std430, binding = BIND_walks) buffer walks_block { walk changes, applies, saves, tiles, looks; };
 layout(std430, binding = BIND_changed) buffer changed_block { change changed[]; };
 layout(std430, binding = BIND_saved) buffer saved_block { saved_pixel saved[]; };
 layout(std430, binding = BIND_filled) buffer filled_block { uint filled[]; }; // a bit a pixel: filled in this phase
 layout(std430, binding = BIND_stamps) buffer stamps_block { uint stamps[]; }; // a word a tile: the step it was listed for last
-layout(std430, binding = BIND_woken) buffer woken_block { uint woken[]; };  // tiles for the next step
+layout(std430, binding = BIND_woken) buffer woken_block { walk wakes; uint woken[]; }; // tiles for the next step
 
-layout(location = 0) uniform uint entries; // STEP 0: room in `changed`, else the entries to walk
+layout(location = 0) uniform uint known;   // STEP 7: see there
 layout(location = 1) uniform uint stamp;   // of this step
 layout(location = 2) uniform uint columns; // tiles in a row
-layout(location = 3) uniform uint all_new; // STEP 1: no entry was filled before in this phase; STEP 4: look at all
-layout(location = 4) uniform uint kept;    // STEP 1: entries saved before this step
+layout(location = 3) uniform uint most;    // STEP 3, 7: tiles; STEP 4: 1: look at all
 layout(location = 5) uniform uint phase;   // STEP 1, 2, 4: PT_FILL_*
 
 // The ring, anticlockwise from east.
@@ -161,12 +167,47 @@ void main()
     } while (++i < steps);
     if (fills == 0u)
         return;
-    uint at = atomicAdd(changed_count, uint(bitCount(fills)));
+    uint at = atomicAdd(changes.count, uint(bitCount(fills)));
     for (; fills != 0u; fills &= fills - 1u, at++) {
         uvec2 found = first + uint(findLSB(fills)) * PT_STEP;
-        if (at < entries) // else the list is made larger and the step repeated: nothing has changed yet
-            changed[at].pixel = found.y * view.width + found.x;
+        changed[at].pixel = found.y * view.width + found.x;
     }
+}
+
+#elif STEP == 7
+
+// How many workgroups of 64 there are for so many.
+void count_groups(inout walk w, uint count)
+{
+    uint groups = (count + 63u) / 64u, in_row = min(groups, 16384u); // as in native/device_gl/tiles.c
+    w.x = in_row;
+    w.y = in_row != 0u ? (groups + in_row - 1u) / in_row : 0u;
+    w.z = 1u;
+}
+
+// Behind 0: what is to change was found; 1: tiles were woken; 2: filling, before the first is marked; 3: entries were marked;
+// 4: those to look at next were chosen. Lists that were walked begin anew.
+void main()
+{
+    bool some = changes.count != 0u;
+    if (known == 0u) {
+        count_groups(tiles, some ? most : 0u);
+        wakes.count = 0u;
+    } else if (known == 1u) {
+        count_groups(wakes, (wakes.count + 3u) / 4u * 64u); // four tiles each: lib/tiles.glsl
+    } else if (known == 2u) {
+        count_groups(saves, saves.count);
+    } else if (known == 3u) {
+        count_groups(saves, some ? saves.count : 0u);
+        looks.count = 0u;
+    } else {
+        count_groups(looks, looks.count);
+    }
+    count_groups(applies, known == 0u ? (changes.count + EACH - 1u) / EACH : 0u);
+    if (known == 0u || known == 3u)
+        count_groups(changes, changes.count);
+    else
+        changes.count = 0u;
 }
 
 #else
@@ -251,7 +292,7 @@ void main()
     bool refined = args.refined != 0u, occluded = phase == PT_FILL_OCCLUDED, unfills = args.unfills != 0u;
     ivec2 size = ivec2(view.width, view.height);
     uint index = entry_index();
-    if (index >= entries)
+    if (index >= changes.count)
         return;
     uint pixel = changed[index].pixel;
     ivec2 place = ivec2(pt_pixel(pixel, view.width));
@@ -272,16 +313,6 @@ void main()
     if (refined && taken)
         key.y = pt_bits(refined_z(view, place, best, source, pt_float(key.y)));
     changed[index] = change(taken ? pixel : NO_PIXEL, key.x, key.y, source);
-    if (!unfills || (!taken && all_new == 0u))
-        return;
-    // An entry filled before in this phase is saved already.
-    uint slot = kept + index;
-    if (all_new == 0u) {
-        if ((filled[pixel >> 5] >> (pixel & 31u) & 1u) != 0u)
-            return;
-        slot = atomicAdd(saved_count, 1u);
-    }
-    saved[slot] = saved_pixel(taken ? pixel : NO_PIXEL, old_key.x, old_key.y, old_from, threshold);
 }
 
 #elif STEP == 2
@@ -289,19 +320,35 @@ void main()
 void main()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
-    uint width = args.view.width, index = entry_index();
+    uint width = args.view.width, group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    bool unfills = args.unfills != 0u, occluded = phase == PT_FILL_OCCLUDED;
     // a pixel can be filled twice in the phase; and what was there before says what is a stray
     bool refills = args.unfills != 0u && (phase == PT_FILL_OCCLUDED || args.alone != 0u);
-    if (index >= entries)
-        return;
-    change c = changed[index];
-    if (c.pixel == NO_PIXEL)
-        return;
-    keys[c.pixel] = uvec2(c.id, c.z);
-    from[c.pixel] = c.from;
-    wake_tiles(rect, pt_pixel(c.pixel, width));
-    if (refills)
-        atomicOr(filled[c.pixel >> 5], 1u << (c.pixel & 31u));
+    uint count = changes.count, first = group * EACH * gl_WorkGroupSize.x + gl_LocalInvocationID.x, saves_here = 0u;
+    for (uint k = 0u; k < EACH && unfills; k++) {
+        uint index = first + k * gl_WorkGroupSize.x, pixel = index < count ? changed[index].pixel : NO_PIXEL;
+        // An entry filled before in this phase is saved already.
+        bool saves_it = pixel != NO_PIXEL && !(occluded && (filled[pixel >> 5] >> (pixel & 31u) & 1u) != 0u);
+        saves_here |= uint(saves_it) << k;
+    }
+    uint at = saves_here != 0u ? atomicAdd(saves.count, uint(bitCount(saves_here))) : 0u; // software takes them one by one
+    for (uint k = 0u; k < EACH; k++) {
+        uint index = first + k * gl_WorkGroupSize.x;
+        if (index >= count)
+            return;
+        change c = changed[index];
+        if (c.pixel == NO_PIXEL)
+            continue;
+        if ((saves_here >> k & 1u) != 0u) {
+            uvec2 old = read_key(c.pixel); // nobody else writes it
+            saved[at++] = saved_pixel(c.pixel, old.x, old.y, texelFetch(from_plane, int(c.pixel)).x);
+        }
+        keys[c.pixel] = uvec2(c.id, c.z);
+        from[c.pixel] = c.from;
+        wake_tiles(rect, pt_pixel(c.pixel, width));
+        if (refills)
+            atomicOr(filled[c.pixel >> 5], 1u << (c.pixel & 31u));
+    }
 }
 
 #elif STEP == 3
@@ -309,8 +356,8 @@ void main()
 void main()
 {
     uint tile = entry_index();
-    if (tile < entries && stamps[tile] == stamp)
-        woken[atomicAdd(woken_count, 1u)] = tile;
+    if (tile < most && stamps[tile] == stamp)
+        woken[atomicAdd(wakes.count, 1u)] = tile;
 }
 
 #else
@@ -323,13 +370,16 @@ void main()
 {
     ivec2 size = ivec2(args.view.width, args.view.height);
     uint index = entry_index();
-    if (index >= entries)
+    if (index >= (most != 0u ? saves.count : looks.count))
         return;
-    uint entry = all_new != 0u ? index : changed[index].id;
-    if (saved[entry].pixel == NO_PIXEL) // nothing reached it
+    uint entry = most != 0u ? index : changed[index].id;
+    saved_pixel s = saved[entry];
+    if (s.pixel == NO_PIXEL) // restored
         return;
-    ivec2 place = ivec2(pt_pixel(saved[entry].pixel, uint(size.x)));
-    float threshold = saved[entry].threshold;
+    ivec2 place = ivec2(pt_pixel(s.pixel, uint(size.x)));
+    precise float threshold = pt_float(s.z); // a neighbour nearer than this was dark
+    if (phase == PT_FILL_OCCLUDED)
+        threshold = threshold - own_distance(args.view, s.from & ~PT_FROM_MIXED, threshold);
     uint white = 0u;
     for (int d = 0; d < 8; d++)
         white |= uint(!(z_at(size, place.x + ring[d].x, place.y + ring[d].y) < threshold)) << d;
@@ -338,7 +388,7 @@ void main()
             if ((white >> d & 1u) == 0u && is_stray(args.view, place + ring[d]))
                 white |= 1u << d;
     if (pt_four_white(white))
-        changed[atomicAdd(changed_count, 1u)].pixel = entry;
+        changed[atomicAdd(changes.count, 1u)].pixel = entry;
 }
 
 // ... gets back what it was before the phase.
@@ -348,7 +398,7 @@ void main()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
     uint width = args.view.width, index = entry_index();
-    if (index >= entries)
+    if (index >= changes.count)
         return;
     uint entry = changed[index].pixel;
     saved_pixel s = saved[entry];
@@ -364,11 +414,11 @@ void main()
 {
     uvec2 corner = uvec2(args.view.rect[0], args.view.rect[1]);
     uint width = args.view.width, index = entry_index();
-    if (index >= entries || saved[index].pixel == NO_PIXEL)
+    if (index >= saves.count || saved[index].pixel == NO_PIXEL)
         return;
     uvec2 tile = (pt_pixel(saved[index].pixel, width) - corner) / 8u;
     if (stamps[tile.y * columns + tile.x] == stamp)
-        changed[atomicAdd(woken_count, 1u)].id = index;
+        changed[atomicAdd(looks.count, 1u)].id = index;
 }
 
 #endif

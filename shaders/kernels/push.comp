@@ -17,8 +17,7 @@ layout(local_size_x = 64) in;
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { push_args args; };
 layout(std430, binding = BIND_keys) buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = BIND_from) buffer from_block { uint from[]; };
-layout(std430, binding = BIND_counters) buffer counters_block { uint taken_count; };
-layout(std430, binding = BIND_taken) buffer taken_block { uint taken[]; };
+layout(std430, binding = BIND_taken) buffer taken_block { uint taken_groups[3], taken_count, taken[]; };
 
 float coarse_z(ivec2 size, int x, int y)
 {
@@ -104,8 +103,6 @@ void main()
 
 #define TAKEN_EACH 4u // pixels an invocation takes, as in native/device_gl/pixels.c
 
-layout(location = 0) uniform uint entries;
-
 // 3. The parent's key, where its surface is not dense at this level; refined: its surface's tangent plane here.
 void take(view_args view, uint coarse_width, bool refined, uint at)
 {
@@ -143,7 +140,7 @@ void main()
     uint group = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * TAKEN_EACH;
     for (uint i = 0u; i < TAKEN_EACH; i++) {
         uint index = (group + i) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
-        if (index < entries)
+        if (index < taken_count)
             take(view, coarse_width, refined, taken[index]);
     }
 }

@@ -23,9 +23,9 @@ layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surf
 layout(std430, binding = BIND_radii) readonly buffer radii_block { uint radii[]; }; // floats or shape words
 
 #if LARGE == 0
-layout(std430, binding = BIND_large) buffer large_block { uint large_count; uint large[]; }; // chunk and slot of each
+layout(std430, binding = BIND_large) buffer large_block { uint large_groups[3], large_count, large[]; }; // chunk and slot of each
 #else
-layout(std430, binding = BIND_large) readonly buffer large_block { uint large_count; uint large[]; };
+layout(std430, binding = BIND_large) readonly buffer large_block { uint large_groups[3], large_count, large[]; };
 layout(location = 5) uniform uint parts; // workgroups that share a disc
 #endif
 

@@ -22,8 +22,7 @@ layout(std430, binding = BIND_arguments) readonly buffer arguments_block {
 };
 layout(std430, binding = BIND_combined) writeonly buffer combined_block { vec4 combined[]; };
 layout(std430, binding = BIND_line) readonly buffer line_block { float line[]; };
-layout(std430, binding = BIND_counters) buffer counters_block { uint edge_count; };
-layout(std430, binding = BIND_edges) buffer edges_block { uint edges[]; };
+layout(std430, binding = BIND_edges) buffer edges_block { uint edge_groups[3], edge_count, edges[]; };
 
 #define ARGS composing
 #include "lib/bodies.glsl"
@@ -94,8 +93,6 @@ void main()
 
 #else
 
-layout(location = 0) uniform uint entries;
-
 vec4 smoothed(smooth_args args, uvec4 rect, uint at)
 {
     uvec2 p = pt_pixel(at, args.view.width);
@@ -110,7 +107,7 @@ void main()
     ivec2 size = ivec2(args.view.width, args.view.height);
     crop_part crop = read_crop();
     uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
-    if (index >= entries)
+    if (index >= edge_count)
         return;
     uint at = edges[index];
     uvec2 pixel = pt_pixel(at, args.view.width), key = read_key(at);

@@ -13,8 +13,9 @@ layout(local_size_x = 32) in;
 
 layout(binding = UNIT_key) uniform usamplerBuffer key_plane;
 layout(std430, binding = BIND_tiles) buffer tiles_block { uint tiles[]; };
-layout(std430, binding = BIND_lists) buffer lists_block { uint lists[]; };   // two of `stride`
-layout(std430, binding = BIND_counts) buffer counts_block { uint counts[]; }; // 0: with points, 1: with a hole's rim
+layout(std430, binding = BIND_lists) buffer lists_block { uint lists[]; }; // with points; `stride` on, with a hole's rim
+
+#define HEAD 4u // words of a list before its entries; its length is the last
 
 layout(location = 0) uniform uvec4 rect;
 layout(location = 1) uniform uint width;
@@ -53,9 +54,9 @@ void main()
             around |= x < 0 || y < 0 || x >= int(size.x) || y >= int(size.y) ? HOLDS_POINTS
                                                                             : tiles[uint(y) * size.x + uint(x)];
     if ((holds & HOLDS_POINTS) != 0u)
-        lists[atomicAdd(counts[0], 1u)] = tile;
+        lists[HEAD + atomicAdd(lists[HEAD - 1u], 1u)] = tile;
     if ((holds & HOLDS_NOTHING) != 0u && (around & HOLDS_POINTS) != 0u)
-        lists[stride + atomicAdd(counts[1], 1u)] = tile;
+        lists[stride + HEAD + atomicAdd(lists[stride + HEAD - 1u], 1u)] = tile;
 }
 
 #endif

@@ -17,8 +17,10 @@ layout(local_size_x = 64) in;
 layout(local_size_x = 32) in; // four tiles' lines
 #endif
 
-layout(std430, binding = BIND_tile_list) readonly buffer tile_list_block { uint tile_list[]; };
-layout(location = 14) uniform uint tile_count;   // in the list
+layout(std430, binding = BIND_tile_list) readonly buffer tile_list_block {
+    uint tile_groups[3], tile_count; // the list's head
+    uint tile_list[];
+};
 layout(location = 15) uniform uint tile_columns; // tiles in a row of the rectangle
 
 // The first pixel of this invocation's line; the others follow PT_STEP apart.
