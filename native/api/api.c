@@ -147,13 +147,13 @@ static int take_turn(patina_frame *frame)
 // Of clouds whose points arrive page by page, what is there now is what the picture is of. renew: nobody's picture goes on yet.
 static void enter_clouds(const patina_scene *scene, int renew)
 {
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         pt_paged_enter(scene->instances[i].cloud, renew);
 }
 
 static void leave_clouds(const patina_scene *scene)
 {
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         pt_paged_leave(scene->instances[i].cloud);
 }
 

@@ -286,7 +286,7 @@ static void pick_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 static int check(const patina_scene *scene, const patina_pick *desc, const uint8_t *bits, size_t size)
 {
-    if (!bits || desc->instance >= scene->instance_count)
+    if (!bits || desc->instance >= scene->cloud_count)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: bits is NULL, or no such instance");
     const uint64_t count = scene->instances[desc->instance].cloud->info.count;
     if (size != (count + 7) / 8)
@@ -385,7 +385,7 @@ static int is_selected(const struct patina_scene *scene, uint32_t id, uint32_t *
 {
     const struct pt_instance *instance = &scene->instances[*last];
     if (id - instance->id_base >= instance->cloud->slots) {
-        for (*last = scene->instance_count - 1; *last && scene->instances[*last].id_base > id;)
+        for (*last = scene->cloud_count - 1; *last && scene->instances[*last].id_base > id;)
             --*last;
         instance = &scene->instances[*last];
     }
@@ -406,7 +406,7 @@ int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene,
         return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_highlight: out of memory");
     int error = pt_frame_read_slots(frame, scene, keys, count * sizeof *keys);
     uint32_t last = 0;
-    for (size_t i = 0; i < count && !error && scene->instance_count; i++) {
+    for (size_t i = 0; i < count && !error && scene->cloud_count; i++) {
         if (keys[i] >> 32 == PT_KEY_EMPTY_Z || (uint32_t)keys[i] >= scene->points ||
             !is_selected(scene, (uint32_t)keys[i], &last))
             continue;

@@ -55,7 +55,7 @@ static void include(void *context, const double corner[3])
 static struct box scene_box(const struct patina_scene *scene)
 {
     struct box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const patina_cloud_info *info = &scene->instances[i].cloud->info;
         if (info->drawn)
             pt_box_corners(info->box_min, info->box_max, scene->instances[i].style.world_from_object, include, &box);

@@ -47,7 +47,7 @@ static int casts_soft(const struct pt_instance *instance)
 
 int pt_soft_casts(const struct patina_scene *scene)
 {
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         if (casts_soft(&scene->instances[i]))
             return 1;
     return 0;
@@ -55,20 +55,21 @@ int pt_soft_casts(const struct patina_scene *scene)
 
 int pt_soft_receives(const struct patina_scene *scene)
 {
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         if (scene->instances[i].style.soft != PATINA_SOFT_OFF && pt_receives(&scene->instances[i]))
             return 1;
     return 0;
 }
 
-int pt_mesh_casts(const struct pt_mesh_instance *instance)
+int pt_mesh_casts(const struct pt_instance *instance)
 {
-    return !(instance->style.shadow_off & PATINA_SHADOW_NO_CAST) && pt_mesh_drawn(instance->mesh);
+    return !(instance->mesh_style.shadow_off & PATINA_SHADOW_NO_CAST) && pt_mesh_drawn(instance->mesh);
 }
 
-int pt_mesh_receives(const struct pt_mesh_instance *instance)
+int pt_mesh_receives(const struct pt_instance *instance)
 {
-    return !(instance->style.shadow_off & PATINA_SHADOW_NO_RECEIVE) && !instance->style.unlit && pt_mesh_drawn(instance->mesh);
+    return !(instance->mesh_style.shadow_off & PATINA_SHADOW_NO_RECEIVE) && !instance->mesh_style.unlit &&
+           pt_mesh_drawn(instance->mesh);
 }
 
 // Meshes are opaque, and among the opaque casters of everyone.
@@ -104,7 +105,7 @@ static int in_layers(const struct pt_instance *instance)
 
 int pt_casts_in_layers(const struct patina_scene *scene)
 {
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         if (in_layers(&scene->instances[i]))
             return 1;
     return 0;
@@ -113,13 +114,13 @@ int pt_casts_in_layers(const struct patina_scene *scene)
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups)
 {
     uint32_t count = 0, casters = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         casters += (uint32_t)opaque(&scene->instances[i]);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
-        casters += (uint32_t)pt_mesh_casts(&scene->meshes[i]);
+        casters += (uint32_t)pt_mesh_casts(pt_mesh_at(scene, i));
     if (casters)
         groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, PT_NO_INSTANCE, 255, 0, 0};
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
         if (opaque(instance) && spares_itself(instance) && pt_receives(instance) && casters > 1)
             groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, i, 255, 0, 0};
@@ -237,7 +238,7 @@ static struct extent look(const struct patina_scene *scene, const struct pt_shad
     struct extent extent = {.axes = axes, .eye = eye};
     const struct patina_scene cut = as_cut(scene);
     struct pt_inverse_clip *room = malloc((cut.clip_count + 1) * sizeof *room); // without: chunks are seen whole
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
         if (group ? !pt_group_casts(scene, group, i) : !casts(instance))
             continue;
@@ -248,8 +249,8 @@ static struct extent look(const struct patina_scene *scene, const struct pt_shad
     }
     free(room);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
-        if (meshes_cast(group) && pt_mesh_casts(&scene->meshes[i]))
-            pt_chunk_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, extend, &extent);
+        if (meshes_cast(group) && pt_mesh_casts(pt_mesh_at(scene, i)))
+            pt_mesh_corners(pt_mesh_at(scene, i), extend, &extent);
     return extent;
 }
 
@@ -355,8 +356,8 @@ static uint32_t fit(double *low, double *high, double texel, uint32_t most)
 }
 
 int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
-                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct pt_mesh_instance *meshes,
-                   struct patina_scene *out, double window[4])
+                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out,
+                   double window[4])
 {
     double axes[9], position[3];
     int parallel = light->light->type == PATINA_LIGHT_SUN;
@@ -369,22 +370,21 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
     out->clips = scene->clips;
     out->clip_count = as_cut(scene).clip_count;
     out->instances = instances;
-    out->instance_count = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    out->cloud_count = 0;
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         if (pt_group_casts(scene, group, i)) {
-            instances[out->instance_count] = scene->instances[i];
-            instances[out->instance_count].style.cull_back = 0; // both sides cast
-            instances[out->instance_count].style.surface = 0;   // maps are filled
+            instances[out->cloud_count] = scene->instances[i];
+            instances[out->cloud_count].style.cull_back = 0; // both sides cast
+            instances[out->cloud_count].style.surface = 0;   // maps are filled
             if (!group->soft)
-                instances[out->instance_count].style.transparency = 0; // its map has one layer
-            out->instance_count++;
+                instances[out->cloud_count].style.transparency = 0; // its map has one layer
+            out->cloud_count++;
         }
-    out->meshes = meshes;
     out->mesh_count = 0;
     out->points = scene->points; // their triangles' ids follow
     for (uint32_t i = 0; i < scene->mesh_count; i++)
-        if (meshes_cast(group) && pt_mesh_casts(&scene->meshes[i]))
-            meshes[out->mesh_count++] = scene->meshes[i];
+        if (meshes_cast(group) && pt_mesh_casts(pt_mesh_at(scene, i)))
+            *pt_mesh_at(out, out->mesh_count++) = *pt_mesh_at(scene, i);
     set_camera(axes, position, &extent, parallel, light->cube != 0, &out->camera);
     out->has_camera = 1;
     out->settings = (patina_settings){.struct_size = sizeof out->settings,
@@ -445,7 +445,7 @@ static void aim(const struct patina_scene *scene, struct pt_plan_light *planned)
 static int some_mesh_receives(const struct patina_scene *scene)
 {
     for (uint32_t i = 0; i < scene->mesh_count; i++)
-        if (pt_mesh_receives(&scene->meshes[i]))
+        if (pt_mesh_receives(pt_mesh_at(scene, i)))
             return 1;
     return 0;
 }
@@ -458,7 +458,7 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
     place_sample(planned, 0, axes, position);
     for (uint32_t face = 0; face < (planned->cube ? 6u : 1u); face++) {
         struct patina_scene survey = {.instances = scene->instances,
-                                      .instance_count = scene->instance_count,
+                                      .cloud_count = scene->cloud_count,
                                       .clips = scene->clips,
                                       .clip_count = as_cut(scene).clip_count,
                                       .has_camera = 1};
@@ -490,7 +490,7 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
     }
     double size = widest_window > 0.0 ? widest_window : 1e-6; // spacing is not known of a handful of points
     int bare = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         bare |= casts(&scene->instances[i]) && !scene->instances[i].cloud->info.has_normals;
     // On triangles the edge of a shadow shows as it is: texels of a 2048th are half a pixel where the picture shows all of it.
     const double finest = some_mesh_receives(scene) ? size / MESH_TEXELS : INFINITY;
@@ -512,16 +512,16 @@ int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, u
 {
     static const char *const names[] = {"", "sun", "point light", "spot", "area light"};
     struct pt_plan_light *planned = &plan->lights[i];
-    struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (3 * (size_t)scene->instance_count + 1) * sizeof *groups);
-    struct pt_instance *instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *instances);
-    struct pt_mesh_instance *meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *meshes);
-    if (!groups || !instances || !meshes || pt_plan_light_map(scene, plan, i))
+    struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (3 * (size_t)scene->cloud_count + 1) * sizeof *groups);
+    struct pt_instance *instances =
+        pt_arena_take(&plan->arena, ((size_t)scene->cloud_count + scene->mesh_count + 1) * sizeof *instances);
+    if (!groups || !instances || pt_plan_light_map(scene, plan, i))
         return PATINA_ERROR_MEMORY;
     struct patina_scene view = {0}; // its first map
     double window[4];
     uint32_t count = pt_shadow_groups(scene, groups), faces = planned->cube ? 6 : 1;
     for (uint32_t face = 0; face < faces && count; face++)
-        if (pt_light_scene(scene, planned, &groups[0], 0, face, instances, meshes, &view, window))
+        if (pt_light_scene(scene, planned, &groups[0], 0, face, instances, &view, window))
             break;
     snprintf(planned->reason, sizeof planned->reason, "%s, %s%u sample%s, %s %u x %u texels, %s", names[planned->light->type],
              planned->samples > 1 && scene->settings.shadow_error > 0.0f ? "to the error target, at most " : "",
@@ -606,8 +606,8 @@ static void put_cuts(struct key *key, const struct patina_scene *scene, const st
 static void put_matrix(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned,
                        const double matrix[16])
 {
-    const double *first = scene->instance_count ? scene->instances[0].style.world_from_object
-                                                : scene->meshes[0].style.world_from_object;
+    const double *first = scene->cloud_count ? scene->instances[0].style.world_from_object
+                                                : pt_mesh_at(scene, 0)->mesh_style.world_from_object;
     const double *from = planned->light->position;
     double linear[9], translation[3], turned[9], moved[3], frame[9];
     pt_light_frame(planned->light->direction, planned->light->side, frame);
@@ -656,16 +656,16 @@ size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light
     put(&key, (double)scene->settings.quality);
     put(&key, (double)scene->settings.fill);
     put(&key, (double)scene->settings.shadow_error);
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         put_instance(&key, scene, planned, i);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
-        if (pt_mesh_casts(&scene->meshes[i])) {
-            put_word(&key, atomic_load(&scene->meshes[i].mesh->alive->fingerprint));
-            put_matrix(&key, scene, planned, scene->meshes[i].style.world_from_object);
-            put(&key, (double)scene->meshes[i].style.alpha);
-            if (scene->meshes[i].style.alpha) { // its holes
-                put(&key, (double)scene->meshes[i].style.alpha_least);
-                put_word(&key, atomic_load(&scene->meshes[i].style.texture->alive->fingerprint));
+        if (pt_mesh_casts(pt_mesh_at(scene, i))) {
+            put_word(&key, atomic_load(&pt_mesh_at(scene, i)->mesh->alive->fingerprint));
+            put_matrix(&key, scene, planned, pt_mesh_at(scene, i)->mesh_style.world_from_object);
+            put(&key, (double)pt_mesh_at(scene, i)->mesh_style.alpha);
+            if (pt_mesh_at(scene, i)->mesh_style.alpha) { // its holes
+                put(&key, (double)pt_mesh_at(scene, i)->mesh_style.alpha_least);
+                put_word(&key, atomic_load(&pt_mesh_at(scene, i)->mesh_style.texture->alive->fingerprint));
             }
         }
     return key.count;

@@ -21,7 +21,7 @@ int pt_plan_tested(const struct patina_scene *scene, const struct pt_plan *pictu
                    uint32_t group)
 {
     int some = receives(scene, picture, round, group, PT_PIXELS);
-    for (uint32_t i = 0; i < scene->instance_count && !some; i++)
+    for (uint32_t i = 0; i < scene->cloud_count && !some; i++)
         some = receives(scene, picture, round, group, i);
     return some;
 }
@@ -173,12 +173,12 @@ static int add_tests(struct tests *tests, int close)
     const struct patina_scene *scene = tests->scene;
     struct pt_plan *map = tests->builder.plan;
     struct patina_cloud *pixels = pt_arena_take(&map->arena, sizeof *pixels);
-    map->receivers = pt_arena_take(&map->arena, ((size_t)scene->instance_count + 1) * sizeof *map->receivers);
+    map->receivers = pt_arena_take(&map->arena, ((size_t)scene->cloud_count + 1) * sizeof *map->receivers);
     if (!pixels || !map->receivers)
         return PATINA_ERROR_MEMORY;
     int error = PATINA_OK;
-    for (uint32_t i = 0; i <= scene->instance_count && !error; i++) {
-        const uint32_t which = i < scene->instance_count ? i : PT_PIXELS;
+    for (uint32_t i = 0; i <= scene->cloud_count && !error; i++) {
+        const uint32_t which = i < scene->cloud_count ? i : PT_PIXELS;
         const uint32_t maps = maps_of(scene, tests->picture, tests->round, which);
         const struct pt_ref positions = {PT_OF_RECEIVER, PT_POSITIONS, map->receiver_count};
         const struct pt_ref words = {PT_OF_RECEIVER, PT_SURFELS, map->receiver_count};
@@ -265,11 +265,11 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
     tests.view = &view;
     tests.group = group;
     struct pt_builder builder = {.scene = &view, .plan = map, .behind = round->layer > 0, .as = "light map"};
-    struct pt_instance *instances = pt_arena_take(&map->arena, (scene->instance_count + 1) * sizeof *instances);
-    struct pt_mesh_instance *meshes = pt_arena_take(&map->arena, (scene->mesh_count + 1) * sizeof *meshes);
-    int error = instances && meshes ? PATINA_OK : PATINA_ERROR_MEMORY;
-    if (error || !pt_light_scene(scene, &picture->lights[round->light], group, round->sample, round->face, instances, meshes,
-                                 &view, window))
+    struct pt_instance *instances =
+        pt_arena_take(&map->arena, ((size_t)scene->cloud_count + scene->mesh_count + 1) * sizeof *instances);
+    int error = instances ? PATINA_OK : PATINA_ERROR_MEMORY;
+    if (error || !pt_light_scene(scene, &picture->lights[round->light], group, round->sample, round->face, instances, &view,
+                                 window))
         return error;
     pt_handle_init(&view.handle);
     if (group->soft) {

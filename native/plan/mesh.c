@@ -27,7 +27,7 @@ static void plan_cover(struct pt_builder *builder, uint32_t i, int shown)
                               .mesh = plan->meshes[i].args,
                               .behind = builder->layer > 1,
                               .shown = (uint32_t)shown,
-                              .first = plan->meshes[i].instance->style.unlit ? pixels_of(plan) : 0};
+                              .first = plan->meshes[i].instance->mesh_style.unlit ? pixels_of(plan) : 0};
     memcpy(args.view.rect, plan->meshes[i].rect, sizeof args.view.rect);
     const struct pt_ref refs[] = {pt_keys_of(builder, 0),
                                   pt_from_of(builder, 0),
@@ -173,7 +173,7 @@ void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)
     int some[2] = {0, 0};
     for (uint32_t i = 0; i < plan->mesh_count; i++)
         if (in_view(&plan->meshes[i]))
-            some[plan->meshes[i].instance->style.unlit] = 1;
+            some[plan->meshes[i].instance->mesh_style.unlit] = 1;
     for (int unlit = 0; unlit < 2; unlit++)
         if (some[unlit])
             plan_shade(builder, color, unlit);

@@ -304,13 +304,13 @@ static const char *no_shadows(const struct patina_scene *scene)
     uint32_t casting = 0, receiving = 0, objects = 0;
     for (uint32_t i = 0; i < scene->light_count; i++)
         casting += scene->lights[i].shadows != 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         receiving += (uint32_t)pt_receives(&scene->instances[i]);
         objects += !(scene->instances[i].style.shadow_off & PATINA_SHADOW_NO_CAST);
     }
     for (uint32_t i = 0; i < scene->mesh_count; i++) {
-        receiving += (uint32_t)pt_mesh_receives(&scene->meshes[i]);
-        objects += (uint32_t)pt_mesh_casts(&scene->meshes[i]);
+        receiving += (uint32_t)pt_mesh_receives(pt_mesh_at(scene, i));
+        objects += (uint32_t)pt_mesh_casts(pt_mesh_at(scene, i));
     }
     return !casting     ? "no light casts shadows"
            : !receiving ? "no lit cloud and no mesh receives shadows"
@@ -670,7 +670,7 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
             plan_points(&builder);
         else
             plan_nothing(&builder, scene->mesh_count        ? "nothing is in view"
-                                   : !scene->instance_count ? "the scene has no cloud"
+                                   : !scene->cloud_count ? "the scene has no cloud"
                                    : plan->soft_count       ? "everything in view is soft"
                                    : !plan->chunks          ? "the clouds have no points"
                                                             : "no cloud is in view");

@@ -228,7 +228,7 @@ struct pt_soft_part {
 };
 
 struct pt_plan_mesh {
-    const struct pt_mesh_instance *instance;
+    const struct pt_instance *instance;
     struct mesh_args args;
     uint32_t rect[4]; // in the planes; empty where it is out of view: x0 >= x1
 };
@@ -464,8 +464,8 @@ static inline int pt_receives(const struct pt_instance *instance) // shadows, at
     return !(instance->style.shadow_off & PATINA_SHADOW_NO_RECEIVE) && instance->style.lighting == PATINA_LIGHTING_LIT &&
            instance->cloud->info.drawn;
 }
-int pt_mesh_casts(const struct pt_mesh_instance *instance);
-int pt_mesh_receives(const struct pt_mesh_instance *instance);
+int pt_mesh_casts(const struct pt_instance *instance);
+int pt_mesh_receives(const struct pt_instance *instance);
 int pt_soft_casts(const struct patina_scene *scene);      // some soft point does
 int pt_soft_receives(const struct patina_scene *scene);   // shadows: some soft point
 int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: its points have opacities of their own
@@ -480,11 +480,11 @@ int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_g
 
 uint32_t pt_veil_slabs(const struct patina_scene *map); // of a soft group's scene: as many as there is memory for
 
-// A scene of the group's casters as a sample of the light sees them, for pt_plan_depth. instances, meshes: room for the scene's. The
+// A scene of the group's casters as a sample of the light sees them, for pt_plan_depth. instances: room for the scene's. The
 // window is what of the map counts, in window units: left, bottom, right, top. 0: there is nothing to see.
 int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
-                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct pt_mesh_instance *meshes,
-                   struct patina_scene *out, double window[4]);
+                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out,
+                   double window[4]);
 
 // What a light's texture depends on, in a fixed order: integers as such, lengths and angles relative to the light.
 // Returns the count of numbers; writes at most `room`.

@@ -22,7 +22,7 @@ int pt_reopen_asked(const struct pt_instance *instance)
 uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     uint32_t asked = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         asked |= asks(&scene->instances[i], PATINA_FREE_SPACE_USE);
     return asked && !plan->map && plan->layers == 1 ? 2 : 0; // behind what is open nothing is peeled
 }

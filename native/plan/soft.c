@@ -254,7 +254,7 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
     uint32_t instances = 0;
     uint64_t chunks = 0;
     float ends[MOST_SLABS];
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         instances += scene->instances[i].style.soft != PATINA_SOFT_OFF;
         chunks += scene->instances[i].style.soft ? scene->instances[i].cloud->chunk_count : 0;
     }
@@ -266,7 +266,7 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
     if (!p.whole || !p.depths || !p.seen)
         return PATINA_ERROR_MEMORY;
     int error = PATINA_OK;
-    for (uint32_t i = 0; i < scene->instance_count && !error; i++)
+    for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
         if (scene->instances[i].style.soft)
             error = place_instance(&p, i);
     plan->soft_depths[0] = INFINITY;
@@ -433,7 +433,7 @@ void pt_plan_soft(struct pt_builder *builder)
     struct pt_plan *plan = builder->plan;
     const int counted = pt_counts_soft(builder);
     uint32_t soft = 0;
-    for (uint32_t i = 0; i < builder->scene->instance_count; i++)
+    for (uint32_t i = 0; i < builder->scene->cloud_count; i++)
         soft += builder->scene->instances[i].style.soft != PATINA_SOFT_OFF;
     if (!plan->soft_part_count) {
         const char *reason = soft ? "no soft cloud is in view" : "no cloud is soft";

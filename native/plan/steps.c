@@ -145,7 +145,7 @@ void pt_plan_light_steps(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
-    const size_t most = 3 * (size_t)builder->scene->instance_count + 1;
+    const size_t most = 3 * (size_t)builder->scene->cloud_count + 1;
     if (plan->light_count && !plan->groups) {
         if (!(plan->groups = pt_arena_take(&plan->arena, most * sizeof *plan->groups))) {
             builder->failed = PATINA_ERROR_MEMORY;

@@ -300,9 +300,9 @@ static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32
 // The cells of what is drawn as range images.
 static int choose_cells(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
 {
-    survey->cells = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->cells);
+    survey->cells = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->cells);
     int error = survey->cells ? PATINA_OK : PATINA_ERROR_MEMORY;
-    for (uint32_t i = 0; i < scene->instance_count && !error; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count && !error; i++) {
         struct cells *cells = &survey->cells[i];
         *cells = (struct cells){0};
         if (!pt_draws_ranges(scene, &scene->instances[i]))
@@ -441,10 +441,10 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
 
 static const float spent = 1.0f / 512.0f; // less opacity does not show
 
-static void plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out)
+static void plan_texture(const struct pt_plan *plan, const struct pt_instance *instance, struct texture_args *out)
 {
-    const struct patina_texture *texture = instance->style.texture;
-    const uint32_t alpha = instance->style.alpha;
+    const struct patina_texture *texture = instance->mesh_style.texture;
+    const uint32_t alpha = instance->mesh_style.alpha;
     if (!texture)
         return;
     out->levels = texture->levels;
@@ -453,11 +453,11 @@ static void plan_texture(const struct pt_plan *plan, const struct pt_mesh_instan
     out->nearest = texture->nearest;
     out->wrap = texture->wrap;
     out->blend = alpha == PATINA_ALPHA_BLEND;
-    out->cut = alpha == PATINA_ALPHA_CLIP ? instance->style.alpha_least : !out->blend ? 0.0f : plan->map ? 0.5f : spent;
+    out->cut = alpha == PATINA_ALPHA_CLIP ? instance->mesh_style.alpha_least : !out->blend ? 0.0f : plan->map ? 0.5f : spent;
     memcpy(out->sizes, texture->sizes, sizeof out->sizes);
 }
 
-static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const struct pt_mesh_instance *instance,
+static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const struct pt_instance *instance,
                        uint32_t id_base, struct pt_plan_mesh *out)
 {
     const struct patina_mesh *mesh = instance->mesh;
@@ -465,7 +465,7 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
     double rows[9], translation[3];
     struct pt_extent extent;
     *out = (struct pt_plan_mesh){.instance = instance};
-    pt_object_of(camera, instance->style.world_from_object, &object);
+    pt_object_of(camera, instance->mesh_style.world_from_object, &object);
     pt_object_rows(camera, &object, rows);
     pt_chunk_translation(camera, &object, &mesh->box, translation);
     if (!pt_mesh_drawn(mesh) || !pt_chunk_bounds(camera, &mesh->box, rows, translation, 0.0, 0, &extent) ||
@@ -479,7 +479,7 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
     args->stride = mesh->stride;
     args->has_normals = mesh->has_normals;
     args->has_colors = mesh->has_colors;
-    memcpy(args->color, instance->style.color, sizeof args->color);
+    memcpy(args->color, instance->mesh_style.color, sizeof args->color);
     plan_texture(plan, instance, &args->texture);
     pt_join_rect(plan->view.rect, out->rect);
     plan->triangles += mesh->info.triangle_count;
@@ -488,21 +488,21 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
 // What the whole picture sees decides spacing, levels, guard: a region must decide alike. 160 covers any guard.
 static int look_around(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
 {
-    plan->instance_count = scene->instance_count;
-    survey->objects = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->objects);
-    survey->seen = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->seen);
-    survey->seen_count = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->seen_count);
-    survey->sieves = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->sieves);
-    survey->thinned = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->thinned);
+    plan->instance_count = scene->cloud_count;
+    survey->objects = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->objects);
+    survey->seen = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->seen);
+    survey->seen_count = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->seen_count);
+    survey->sieves = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->sieves);
+    survey->thinned = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->thinned);
     if (!survey->thinned || !survey->sieves || !survey->objects || !survey->seen || !survey->seen_count)
         return PATINA_ERROR_MEMORY;
     int error = pt_eye_of(scene, &survey->camera);
     const struct pt_eye bare = survey->camera;
     pt_pad_eye(&survey->camera, AROUND);
-    for (uint32_t i = 0; i < scene->instance_count && !error; i++)
+    for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
         error = look_at_instance(scene, plan, survey, i);
     for (uint32_t i = 0; i < scene->mesh_count && !plan->map; i++)
-        plan->transparent |= scene->meshes[i].style.alpha == PATINA_ALPHA_BLEND && pt_mesh_drawn(scene->meshes[i].mesh);
+        plan->transparent |= pt_mesh_at(scene, i)->mesh_style.alpha == PATINA_ALPHA_BLEND && pt_mesh_drawn(pt_mesh_at(scene, i)->mesh);
     survey->camera = bare;
     struct pt_spread spread = {.middle = plan->spacing_middle, .most = plan->spacing_px};
     if (!error)
@@ -521,7 +521,7 @@ int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = {0};
-    plan->instances = pt_arena_take(&plan->arena, (2 * (size_t)scene->instance_count + 1) * sizeof *plan->instances);
+    plan->instances = pt_arena_take(&plan->arena, (2 * (size_t)scene->cloud_count + 1) * sizeof *plan->instances);
     plan->mesh_count = scene->mesh_count;
     plan->meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->meshes);
     if (!plan->instances || !plan->meshes)
@@ -555,13 +555,11 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "planes of %u x %u pixels are too large: render in regions",
                        plan->view.width, plan->view.height);
-    for (uint32_t i = 0; i < scene->instance_count && !error; i++)
+    for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
         error = place_instance(scene, plan, &survey, i);
-    uint64_t id_base = scene->points;
-    for (uint32_t i = 0; i < scene->mesh_count && !error; i++) {
-        place_mesh(plan, &survey.camera, &scene->meshes[i], (uint32_t)id_base, &plan->meshes[i]);
-        id_base += scene->meshes[i].mesh->info.triangle_count;
-    }
+    for (uint32_t i = 0; i < scene->mesh_count && !error; i++)
+        place_mesh(plan, &survey.camera, pt_mesh_at(scene, i), (uint32_t)scene->points + pt_mesh_at(scene, i)->id_base,
+                   &plan->meshes[i]);
     return error || (plan->map && !plan->veils) ? error : pt_place_soft(scene, plan, &survey.camera);
 }
 

@@ -38,7 +38,7 @@ int pt_knows_discs(const struct patina_scene *scene, const struct pt_instance *i
 int pt_knows_reach(const struct patina_scene *scene)
 {
     int known = scene->settings.surface == PATINA_SURFACE_AUTO;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         known = known && (pt_all_soft(&scene->instances[i]) || pt_knows_discs(scene, &scene->instances[i]));
     return known;
 }
@@ -46,7 +46,7 @@ int pt_knows_reach(const struct patina_scene *scene)
 int pt_knows_sigmas(const struct patina_scene *scene)
 {
     int known = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         known |= !pt_all_soft(&scene->instances[i]) && scene->instances[i].cloud->shapes && scene->instances[i].cloud->beside;
     return known && (scene->settings.surface == PATINA_SURFACE_SPLATS || closes_by_analysis(&scene->settings));
 }

@@ -159,7 +159,7 @@ static int bind_receiver(struct pt_binder *binder, const struct pt_ref *ref, str
 
 static int bind_mesh(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
 {
-    const struct pt_mesh_instance *instance = binder->plan->meshes[ref->index].instance;
+    const struct pt_instance *instance = binder->plan->meshes[ref->index].instance;
     struct pt_bound_mesh *bound = &binder->meshes[ref->index];
     int error = PATINA_OK;
     *out = &binder->none;
@@ -168,9 +168,9 @@ static int bind_mesh(struct pt_binder *binder, const struct pt_ref *ref, struct 
             error = pt_residency_take_mesh(binder->residency, binder->device, instance->mesh, &bound->mesh);
         if (!error)
             *out = &bound->mesh->buffers[ref->which];
-    } else if (instance->style.texture) {
+    } else if (instance->mesh_style.texture) {
         if (!bound->texture)
-            error = pt_residency_take_texture(binder->residency, binder->device, instance->style.texture, &bound->texture);
+            error = pt_residency_take_texture(binder->residency, binder->device, instance->mesh_style.texture, &bound->texture);
         if (!error)
             *out = &bound->texture->buffers[0];
     }

@@ -19,7 +19,7 @@ int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
     int error = pt_plan_textures(&whole, &plan);
     if (error)
         return pt_fail(&frame->handle, error, "shadow textures: out of memory");
-    if (!plan.light_count || !scene->instance_count)
+    if (!plan.light_count || !scene->cloud_count)
         error = pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "shadows: no light of the scene casts any, or there is no cloud");
     if (!error)
         error = pt_frame_number(frame, scene);

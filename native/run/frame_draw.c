@@ -10,7 +10,7 @@
 int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene)
 {
     return pt_numbering_take(&frame->numbering, scene)
-               ? pt_fail(NULL, PATINA_ERROR_MEMORY, "numbering %u instances: out of memory", scene->instance_count)
+               ? pt_fail(NULL, PATINA_ERROR_MEMORY, "numbering %u instances: out of memory", scene->cloud_count)
                : PATINA_OK;
 }
 

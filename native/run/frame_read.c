@@ -102,8 +102,8 @@ int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t 
 
 int pt_frame_read_slots(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size)
 {
-    int same = frame->numbering.count == scene->instance_count;
-    for (uint32_t i = 0; same && i < scene->instance_count; i++)
+    int same = frame->numbering.count == scene->cloud_count;
+    for (uint32_t i = 0; same && i < scene->cloud_count; i++)
         same = frame->numbering.clouds[i].alive == scene->instances[i].cloud->alive;
     if (!same)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "the frame's last picture is of another scene");

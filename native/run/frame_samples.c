@@ -61,7 +61,7 @@ struct pt_sampling pt_choose_sampling(const struct patina_scene *scene, const st
     struct pt_sampling sampling = {1, 1, 0};
     if (samples < 2 || !pt_plan_shows(plan))
         return sampling;
-    if (!scene->instance_count) // meshes alone
+    if (!scene->cloud_count) // meshes alone
         return (struct pt_sampling){1, samples, 1};
     uint32_t grid = (uint32_t)sqrt((double)samples); // exact below 2^26
     if (scene->settings.pixel_noise > 0.0f && samples >= PT_NOISE_SHIFTS)

@@ -189,9 +189,9 @@ static int check_header(struct reader *reader, const struct patina_scene *scene,
     if (reader->lights != plan->light_count)
         return pt_fail(&reader->frame->handle, PATINA_ERROR_FORMAT, "%s: stale: baked with %u casting lights, the scene has %u",
                        reader->path, reader->lights, plan->light_count);
-    if (reader->instances != scene->instance_count)
+    if (reader->instances != scene->cloud_count)
         return pt_fail(&reader->frame->handle, PATINA_ERROR_FORMAT, "%s: foreign: baked for %u clouds, the scene has %u",
-                       reader->path, reader->instances, scene->instance_count);
+                       reader->path, reader->instances, scene->cloud_count);
     return PATINA_OK;
 }
 

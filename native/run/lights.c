@@ -177,7 +177,7 @@ static int test_points(struct pt_execution *e, const struct pt_step *step, uint3
 
 static int some_receives(const struct patina_scene *scene)
 {
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         if (pt_receives(&scene->instances[i]))
             return 1;
     return 0;

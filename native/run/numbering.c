@@ -13,10 +13,10 @@ void pt_numbering_release(struct pt_numbering *numbering)
 
 int pt_numbering_take(struct pt_numbering *numbering, const struct patina_scene *scene)
 {
-    struct pt_numbering taken = {.clouds = calloc(scene->instance_count + 1u, sizeof *taken.clouds)};
+    struct pt_numbering taken = {.clouds = calloc(scene->cloud_count + 1u, sizeof *taken.clouds)};
     if (!taken.clouds)
         return PATINA_ERROR_MEMORY;
-    for (; taken.count < scene->instance_count; taken.count++) {
+    for (; taken.count < scene->cloud_count; taken.count++) {
         const struct pt_instance *instance = &scene->instances[taken.count];
         const struct patina_cloud *cloud = instance->cloud;
         taken.clouds[taken.count] = (struct pt_numbered){cloud, cloud->alive, instance->id_base, (uint32_t)cloud->slots,

@@ -30,7 +30,7 @@ static int is_first(const struct patina_scene *scene, uint32_t i)
 static uint64_t mapped_bytes(const struct patina_scene *scene)
 {
     uint64_t bytes = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         bytes += scene->instances[i].cloud->mapped && is_first(scene, i) ? pt_cloud_mapped_bytes(scene->instances[i].cloud) : 0;
     return bytes;
 }
@@ -67,7 +67,7 @@ static uint64_t held_now(const struct pt_pager *pager)
 
 static void give_back(struct pt_pager *pager)
 {
-    for (uint32_t i = 0; i < pager->scene->instance_count; i++)
+    for (uint32_t i = 0; i < pager->scene->cloud_count; i++)
         if (pager->scene->instances[i].cloud->mapped)
             pt_cloud_return(pager->scene->instances[i].cloud);
 }

@@ -67,7 +67,7 @@ uint64_t pt_parts_digest(const struct patina_scene *scene, const struct pt_plan 
     }
     for (uint32_t i = 0; i < plan->instance_count; i++)
         hash = add(hash, plan->instances[i].chunks, plan->instances[i].chunk_count * sizeof *plan->instances[i].chunks);
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         hash = add_cloud(hash, &scene->instances[i]);
     for (uint32_t i = 0; i < scene->light_count; i++)
         hash = add_light(hash, &scene->lights[i]);

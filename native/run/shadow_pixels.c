@@ -20,10 +20,10 @@ static uint64_t view_of(const struct patina_scene *scene, const struct pt_plan *
     words = pt_fingerprint(words, c->world_from_camera, sizeof c->world_from_camera);
     words = pt_fingerprint(words, window, sizeof window);
     for (uint32_t i = 0; i < scene->mesh_count; i++) {
-        const uint64_t mesh = atomic_load(&scene->meshes[i].mesh->alive->fingerprint);
+        const uint64_t mesh = atomic_load(&pt_mesh_at(scene, i)->mesh->alive->fingerprint);
         words = pt_fingerprint(words, &mesh, sizeof mesh);
-        words = pt_fingerprint(words, scene->meshes[i].style.world_from_object,
-                               sizeof scene->meshes[i].style.world_from_object);
+        words = pt_fingerprint(words, pt_mesh_at(scene, i)->mesh_style.world_from_object,
+                               sizeof pt_mesh_at(scene, i)->mesh_style.world_from_object);
     }
     return words;
 }

@@ -55,8 +55,8 @@ uint64_t pt_shadows_identity(const struct pt_instance *instance)
 // The words are for these instances and so many lights.
 static int same_places(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan)
 {
-    int same = shadows->light_count == plan->light_count && shadows->instance_count == scene->instance_count;
-    for (uint32_t i = 0; same && i < scene->instance_count; i++)
+    int same = shadows->light_count == plan->light_count && shadows->instance_count == scene->cloud_count;
+    for (uint32_t i = 0; same && i < scene->cloud_count; i++)
         same = shadows->fingerprints[i] == pt_shadows_identity(&scene->instances[i]);
     return same;
 }
@@ -66,16 +66,16 @@ int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shad
 {
     forget_lights(shadows);
     forget_instances(device, shadows);
-    shadows->words = calloc((size_t)scene->instance_count + 1, sizeof *shadows->words);
-    shadows->marks = calloc((size_t)scene->instance_count + 1, sizeof *shadows->marks);
-    shadows->fingerprints = calloc((size_t)scene->instance_count + 1, sizeof *shadows->fingerprints);
+    shadows->words = calloc((size_t)scene->cloud_count + 1, sizeof *shadows->words);
+    shadows->marks = calloc((size_t)scene->cloud_count + 1, sizeof *shadows->marks);
+    shadows->fingerprints = calloc((size_t)scene->cloud_count + 1, sizeof *shadows->fingerprints);
     if (!shadows->words || !shadows->marks || !shadows->fingerprints) {
         forget_instances(device, shadows);
         return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
     }
-    shadows->instance_count = scene->instance_count;
+    shadows->instance_count = scene->cloud_count;
     shadows->light_count = light_count;
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         uint64_t points = scene->instances[i].cloud->slots;
         shadows->fingerprints[i] = pt_shadows_identity(&scene->instances[i]);
         if (!shadows->fingerprints[i])

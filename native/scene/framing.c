@@ -57,11 +57,10 @@ static int keep_instance(const patina_scene *scene, const struct pt_instance *in
 
 static int keep_scene(const patina_scene *scene, struct framing *f)
 {
-    for (uint32_t i = 0; i < scene->instance_count && !f->error; i++)
+    for (uint32_t i = 0; i < scene->cloud_count && !f->error; i++)
         keep_instance(scene, &scene->instances[i], f);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
-        if (pt_mesh_drawn(scene->meshes[i].mesh))
-            pt_chunk_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, keep_corner, f);
+        pt_mesh_corners(pt_mesh_at(scene, i), keep_corner, f);
     if (!f->error && !f->count) // clips left the strays alone
         f->error = pt_each_corner(scene, keep_corner, f);
     return f->error;

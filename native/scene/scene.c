@@ -54,7 +54,6 @@ void patina_scene_destroy(patina_scene *scene)
     patina_scene_clear(scene);
     free(scene->instances);
     free(scene->lights);
-    free(scene->meshes);
     free(scene->clips);
     pt_handle_destroy(&scene->handle);
     free(scene);
@@ -64,9 +63,9 @@ int patina_scene_clear(patina_scene *scene)
 {
     if (!scene)
         return fail(NULL, "patina_scene_clear: scene is NULL");
-    for (uint32_t i = 0; i < scene->instance_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
         free((void *)scene->instances[i].style.ramp);
-    scene->instance_count = scene->light_count = scene->mesh_count = scene->clip_count = 0;
+    scene->cloud_count = scene->light_count = scene->mesh_count = scene->clip_count = 0;
     scene->points = scene->given = scene->triangles = 0;
     return PATINA_OK;
 }
@@ -154,7 +153,7 @@ static int check_soft(const patina_scene *scene, patina_cloud_style *style, cons
     style->soft_opacity = style->soft_opacity == 0.0f ? 0.5f : style->soft_opacity;
     if (!style->soft)
         return PATINA_OK;
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const patina_cloud_style *other = &scene->instances[i].style;
         if (other->soft && (other->soft_model != style->soft_model || other->soft_shells != style->soft_shells))
             return pt_fail(
@@ -221,15 +220,18 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     int error = pt_take(&scene->handle, "patina_scene_add_cloud", style, &checked, sizeof checked);
     if (error || (error = check_style(scene, &checked, cloud)) || (error = too_many(scene, cloud->slots, cloud->info.count)))
         return error;
-    void *grown = grow(scene->instances, scene->instance_count, &scene->instance_room, sizeof *scene->instances);
+    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room, sizeof *scene->instances);
     if (!grown)
-        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for instance %u", scene->instance_count);
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for instance %u", scene->cloud_count);
     scene->instances = grown;
     if (copy_ramp(&checked))
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for the ramp of instance %u",
-                       scene->instance_count);
-    scene->instances[scene->instance_count++] = (struct pt_instance){
-        .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points};
+                       scene->cloud_count);
+    struct pt_instance *added = &scene->instances[scene->cloud_count];
+    memmove(added + 1, added, scene->mesh_count * sizeof *added);
+    *added = (struct pt_instance){
+        .source = PT_SOURCE_CLOUD, .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points};
+    scene->cloud_count++;
     scene->points += cloud->slots;
     scene->given += cloud->info.count;
     return PATINA_OK;
@@ -266,11 +268,12 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
     error = too_many(scene, mesh->info.triangle_count, mesh->info.triangle_count);
     if (error)
         return error;
-    void *grown = grow(scene->meshes, scene->mesh_count, &scene->mesh_room, sizeof *scene->meshes);
+    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room, sizeof *scene->instances);
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for mesh %u", scene->mesh_count);
-    scene->meshes = grown;
-    scene->meshes[scene->mesh_count++] = (struct pt_mesh_instance){.mesh = mesh, .style = checked};
+    scene->instances = grown;
+    *pt_mesh_at(scene, scene->mesh_count++) = (struct pt_instance){
+        .source = PT_SOURCE_MESH, .mesh = mesh, .mesh_style = checked, .id_base = (uint32_t)scene->triangles};
     scene->triangles += mesh->info.triangle_count;
     return PATINA_OK;
 }
@@ -501,13 +504,19 @@ void pt_chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_
     pt_box_corners(lower, upper, matrix, work, context);
 }
 
+void pt_mesh_corners(const struct pt_instance *instance, pt_corner_work *work, void *context)
+{
+    if (pt_mesh_drawn(instance->mesh))
+        pt_chunk_corners(&instance->mesh->box, instance->mesh_style.world_from_object, work, context);
+}
+
 // PATINA_ERROR_MEMORY when there is none; without points, nothing is called back.
 int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *context)
 {
     struct pt_inverse_clip *room = malloc((scene->clip_count + 1) * sizeof *room);
     if (!room)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "framing the scene: out of memory");
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const patina_cloud *cloud = scene->instances[i].cloud;
         struct pt_sieve sieve = pt_sieve_make(scene, &scene->instances[i], PT_EVERY_POINT, room);
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
@@ -515,8 +524,7 @@ int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *contex
                 pt_chunk_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
     }
     for (uint32_t i = 0; i < scene->mesh_count; i++)
-        if (pt_mesh_drawn(scene->meshes[i].mesh))
-            pt_chunk_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, work, context);
+        pt_mesh_corners(pt_mesh_at(scene, i), work, context);
     free(room);
     return PATINA_OK;
 }

@@ -9,25 +9,28 @@
 
 static inline int pt_is_zero(const float v[3]) { return v[0] == 0.0f && v[1] == 0.0f && v[2] == 0.0f; }
 
-struct pt_instance {
-    const struct patina_cloud *cloud;
-    patina_cloud_style style; // defaults made explicit; its ramp is the scene's
-    uint32_t id_base;
-};
+// What an instance is of.
+enum pt_source { PT_SOURCE_CLOUD, PT_SOURCE_MESH };
 
-struct pt_mesh_instance {
-    const struct patina_mesh *mesh;
-    patina_mesh_style style; // defaults made explicit
+struct pt_instance {
+    enum pt_source source;
+    uint32_t id_base; // of its first point, or of its first triangle among triangles
+    union {
+        const struct patina_cloud *cloud;
+        const struct patina_mesh *mesh;
+    };
+    union { // defaults made explicit
+        patina_cloud_style style; // its ramp is the scene's
+        patina_mesh_style mesh_style;
+    };
 };
 
 struct patina_scene {
     struct pt_handle handle;
-    struct pt_instance *instances;
-    uint32_t instance_count, instance_room;
+    struct pt_instance *instances; // those of clouds, whose numbers callers know; behind them those of meshes: so do their ids
+    uint32_t cloud_count, mesh_count, instance_room;
     patina_light_desc *lights;
     uint32_t light_count, light_room;
-    struct pt_mesh_instance *meshes;
-    uint32_t mesh_count, mesh_room;
     uint64_t triangles; // of all meshes
     patina_clip *clips; // defaults made explicit
     uint32_t clip_count, clip_room;
@@ -44,6 +47,11 @@ struct patina_scene {
 
 // Lengths in pixels, of a picture of so many times finer ones.
 void pt_effects_scale(patina_effects *effects, float factor);
+
+static inline struct pt_instance *pt_mesh_at(const struct patina_scene *scene, uint32_t i)
+{
+    return &scene->instances[scene->cloud_count + i];
+}
 
 static inline uint32_t pt_finer(const struct patina_scene *scene) { return scene->finer > 1 ? scene->finer : 1; }
 
@@ -74,6 +82,7 @@ typedef void pt_corner_work(void *context, const double corner[3]);
 void pt_box_corners(const double lower[3], const double upper[3], const double matrix[16], pt_corner_work *work, void *context);
 void pt_chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_corner_work *work, void *context);
 int pt_each_corner(const struct patina_scene *scene, pt_corner_work *work, void *context);
+void pt_mesh_corners(const struct pt_instance *instance, pt_corner_work *work, void *context);
 
 // None of its points is drawn as a point or disc.
 static inline int pt_all_soft(const struct pt_instance *instance) { return instance->style.soft == PATINA_SOFT_ALL; }
