@@ -11,7 +11,7 @@ static int wants_normals(const struct pt_builder *builder, const struct pt_plan_
 
 int pt_averages(const struct pt_builder *builder, const struct pt_plan_instance *instance)
 {
-    return builder->scene->settings.average && instance->chunk_count && !instance->discs && !instance->args.has_opacities &&
+    return builder->scene->settings.average && pt_draws(instance, PT_AS_POINTS) && !instance->args.has_opacities &&
            (instance->instance->style.color_source == PATINA_COLOR_OWN || wants_normals(builder, instance));
 }
 

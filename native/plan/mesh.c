@@ -13,10 +13,10 @@ static void plan_raster(struct pt_builder *builder, uint32_t i)
 {
     const struct pt_plan *plan = builder->plan;
     struct raster_args args = {.view = plan->view, .mesh = plan->meshes[i].args, .behind = builder->layer > 1};
-    const struct pt_ref refs[] = {pt_plane_at(PT_PLANE_MESH_KEYS, 0), pt_mesh_buffer_of(PT_MESH_VERTICES, i),
-                                  pt_mesh_buffer_of(PT_MESH_INDICES, i), pt_mesh_buffer_of(PT_MESH_TEXELS, i),
-                                  pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0)};
-    struct pt_pass *pass = pt_add(builder, PT_KERNEL_raster, "raster", &args, sizeof args, refs, sizeof refs / sizeof *refs);
+    struct pt_ref refs[2 + PT_KIND_BUFFERS] = {pt_plane_at(PT_PLANE_MESH_KEYS, 0)};
+    uint32_t count = 1 + pt_bind_kind(PT_AS_MESH, i, refs + 1);
+    refs[count++] = pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0);
+    struct pt_pass *pass = pt_add(builder, PT_KERNEL_raster, "raster", &args, sizeof args, refs, count);
     PT_REASON(pass, "%u triangles of mesh %u", args.mesh.id_count, i);
 }
 

@@ -44,6 +44,14 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
     return pass;
 }
 
+int pt_has_pass(const struct pt_plan *plan, enum pt_kernel kernel)
+{
+    for (uint32_t i = 0; i < plan->pass_count; i++)
+        if (plan->passes[i].kernel == kernel)
+            return 1;
+    return 0;
+}
+
 void pt_skip(struct pt_builder *builder, const char *name, const char *reason)
 {
     struct pt_plan *plan = builder->plan;

@@ -71,6 +71,14 @@ static inline struct pt_ref pt_mesh_buffer_of(enum pt_mesh_buffer which, uint32_
 {
     return (struct pt_ref){PT_OF_MESH, which, mesh};
 }
+// What finding the instance's pixels reads of it. Returns how many these are.
+static inline uint32_t pt_bind_kind(enum pt_kind kind, uint32_t i, struct pt_ref *refs)
+{
+    const struct pt_kind_row *row = &pt_kinds[kind];
+    for (uint32_t k = 0; k < row->buffer_count; k++)
+        refs[k] = (struct pt_ref){row->source == PT_SOURCE_MESH ? PT_OF_MESH : PT_OF_INSTANCE, row->buffers[k], i};
+    return row->buffer_count;
+}
 
 // Shading into UNLIT: as without lights.
 static inline void pt_own_colors(enum pt_plane color, struct shade_args *args)
@@ -160,7 +168,7 @@ enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words); /
 void pt_plan_splat(struct pt_builder *builder);
 int pt_tells_surfaces(const struct pt_builder *builder); // the depth asked for is that of the surface
 int pt_tells_depths(const struct pt_builder *builder);   // and discs, in the mean, tell how far off it is
-void pt_plan_blend(struct pt_builder *builder);          // after pt_plan_resolve of every instance
+void pt_plan_blend(struct pt_builder *builder);          // after pt_plan_resolve of every instance; nothing where no discs are
 int pt_blends_light(const struct pt_builder *builder);   // light arrives at all discs of a pixel: at the mean of their words
 void pt_plan_blend_marks(struct pt_builder *builder);    // in place of mark
 void pt_plan_blend_light(struct pt_builder *builder);    // once shadow words are known
@@ -207,8 +215,12 @@ void pt_plan_reopen_keep(struct pt_builder *builder);                      // be
 void pt_plan_reopen_take(struct pt_builder *builder);                      // after it
 void pt_plan_reopen_show(struct pt_builder *builder, enum pt_plane color); // after shading
 
-// plan.c: normal and layer distance of an instance's pixels.
+// points.c: points as pixels; normal and layer distance of an instance's pixels; and why some of that was not needed.
+void pt_plan_points(struct pt_builder *builder);
 void pt_plan_resolve(struct pt_builder *builder, uint32_t instance);
+void pt_plan_resolved(struct pt_builder *builder);
+// passes.c: whether the plan has a pass of the kernel so far.
+int pt_has_pass(const struct pt_plan *plan, enum pt_kernel kernel);
 
 // ---- views -------------------------------------------------------------------------------------------------------------
 

@@ -12,94 +12,12 @@
 #include <stdio.h>
 #include <string.h>
 
-// Radius of the window for image-space normals: two spacings, at least 3 pixels so that a point's place within its pixel
-// averages out, at most 16 (beyond, points are too far apart on screen for a surface to be seen anyway). Pixels take less of it
-// where points lie nearer together, PT_ESTIMATE_LEAST at least.
-enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = PT_REACH_normals, BLEND_MOST = PT_REACH_shade - 1 };
+enum { BLEND_MOST = PT_REACH_shade - 1 };
 // Of each filling filter in a light's map, at most: more widen steep surfaces (tests/scenes/test_shadow: 0.20% in place of
 // 0.18% wrong), one leaves holes that light leaks through.
 enum { MAP_ITERATIONS = 2 };
 
 // ---- the passes --------------------------------------------------------------------------------------------------------
-
-static void plan_scatter(struct pt_builder *builder)
-{
-    struct pt_plan *plan = builder->plan;
-    struct scatter_args args = {
-        .view = plan->view, .behind = builder->layer > 1 || builder->behind, .sifted = plan->drawn_words > 0};
-    struct pt_ref *refs = pt_arena_take(&plan->arena, (3 + 3 * (size_t)plan->instance_count) * sizeof *refs);
-    uint64_t points = 0, chunks = 0;
-    uint32_t count = 0;
-    if (!refs) {
-        builder->failed = PATINA_ERROR_MEMORY;
-        return;
-    }
-    refs[count++] = pt_keys_of(builder, 0);
-    refs[count++] = pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0);
-    refs[count++] = args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
-    for (uint32_t i = 0; i < plan->instance_count; i++) {
-        if (!plan->instances[i].chunk_count || plan->instances[i].discs)
-            continue;
-        refs[count++] = pt_buffer_of(PT_CHUNKS, i);
-        refs[count++] = pt_buffer_of(PT_POSITIONS, i);
-        refs[count++] = pt_buffer_of(PT_SURFELS, i);
-        args.instances++;
-        chunks += plan->instances[i].chunk_count;
-        points += plan->instances[i].points;
-    }
-    struct pt_pass *pass = pt_add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
-    if (builder->layer > 1)
-        PT_REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
-    else if (builder->again)
-        PT_REASON(pass, "points behind what is drawn already, %u instances", args.instances);
-    else
-        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view", (unsigned long long)points,
-                  (unsigned long long)chunks, args.instances);
-}
-
-// Discs behind each other that are one surface, where layers are told apart. Without normals discs face the picture: along a slope
-// of s they lie up to s radii before and behind it, 2 radii / |n.v| in all. In its own pixel a disc that its centre's ray misses
-// lies where its point does: of a slope, up to 0.71 pixels before it or behind.
-#define DISC_PIXELS 1.5f
-#define DISC_RADII 2.3f // classes of spacings are 1.19 wide: others' discs may be as much wider
-
-static void join_discs(const struct pt_plan_instance *instance, struct resolve_args *args)
-{
-    args->view.footprint *= DISC_PIXELS;
-    if (args->instance.has_normals)
-        return;
-    args->instance.d_min = fmaxf(args->instance.d_min, DISC_RADII * instance->radius); // 0: of as many spacings
-    for (uint32_t k = 0; k < PT_SPACINGS && !(instance->radius > 0.0f); k++)
-        args->instance.spacing[k] *= DISC_RADII * PT_DISC_SPACINGS / PT_SPACING_FACTOR;
-}
-
-void pt_plan_resolve(struct pt_builder *builder, uint32_t i)
-{
-    struct pt_plan *plan = builder->plan;
-    const struct pt_plan_instance *instance = &plan->instances[i];
-    if (!instance->args.has_normals) {
-        double wanted = ceil(2.0 * plan->spacing_px);
-        struct normals_args args = {.view = pt_view_of(plan, instance, 0), .instance = instance->args};
-        args.radius = wanted < ESTIMATE_LEAST ? ESTIMATE_LEAST : wanted > ESTIMATE_MOST ? ESTIMATE_MOST : (uint32_t)wanted;
-        args.steep = !builder->layer;
-        PT_REASON(PT_ADD(builder, normals, args,
-                         {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFELS, i), pt_plane_at(PT_PLANE_NORMAL, 0)}),
-                  "instance %u has no normals: estimated from the depth of at most %u x %u pixels", i, 2 * args.radius + 1,
-                  2 * args.radius + 1);
-    }
-    const int thick = pt_has_sigmas(plan, instance);
-    struct resolve_args args = {.view = pt_view_of(plan, instance, 0),
-                                .instance = instance->args,
-                                .sigma_scale = thick ? pt_sigma_scale(instance) : 0.0f,
-                                .with_span = plan->sigmas != 0};
-    if (instance->discs && plan->layers > 1)
-        join_discs(instance, &args);
-    PT_REASON(PT_ADD(builder, resolve, args,
-                     {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFELS, i), pt_plane_at(PT_PLANE_NORMAL, 0),
-                      pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0), thick ? pt_shapes_of(instance, i) : pt_nothing(),
-                      pt_plane_if(plan->sigmas, PT_PLANE_SPAN, 0)}),
-              "layer distance%s and normal of instance %u's pixels", thick ? " by sigma" : "", i);
-}
 
 // color: COLOR_A, or UNLIT for the points' own colours.
 static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane color)
@@ -116,17 +34,17 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     double blend = floor(0.5 * plan->spacing_px + 0.5);
     uint32_t wants_normals = args.instance.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u) |
                              (uint32_t)pt_effects_want_normals(builder->scene);
-    const int discs = instance->discs != 0; // blended already
-    if (discs && shown) {
+    const int planes = pt_kinds[instance->kind].in_planes;
+    if (planes && shown) {
         args.instance.color_format = PT_COLOR_OF_PLANE;
         args.instance.has_opacities = plan->transparent != 0;
     }
     if (shown && pt_averages(builder, instance))
         args.instance.color_format = PT_COLOR_OF_PIXEL;
-    if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && (!discs || plan->iterations))
+    if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && (!planes || plan->iterations))
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     pt_own_colors(color, &args);
-    args.of_pixels = discs && !instance->range && args.light_count && pt_blends_light(builder);
+    args.of_pixels = instance->kind == PT_AS_DISCS && args.light_count && pt_blends_light(builder);
     if (shown)
         pt_plan_recolor(builder, instance, &args);
     int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE || args.instance.color_format == PT_COLOR_OF_PIXEL;
@@ -206,12 +124,9 @@ static struct compose_args compose_args(const struct pt_plan *plan)
                                  .crop_height = plan->crop[3]};
 }
 
-static int draws_discs(const struct pt_plan *plan)
+static int fills_planes(const struct pt_plan *plan)
 {
-    for (uint32_t i = 0; i < plan->instance_count; i++)
-        if (plan->instances[i].chunk_count && plan->instances[i].discs)
-            return 1;
-    return 0;
+    return pt_plan_draws(plan, PT_AS_DISCS) || pt_plan_draws(plan, PT_AS_RANGES);
 }
 
 static struct extract_args extract_args(const struct pt_builder *builder, uint32_t passes)
@@ -228,7 +143,7 @@ static struct extract_args extract_args(const struct pt_builder *builder, uint32
                                 .shadow = pt_plan_shows(plan) && plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u),
                                 .discs_first = plan->discs_first,
                                 // of layers only the last is there still; where no disc is drawn nothing says where one fell
-                                .discs_count = plan->layers > 1 || !draws_discs(plan) ? 0 : plan->discs_count};
+                                .discs_count = plan->layers > 1 || !fills_planes(plan) ? 0 : plan->discs_count};
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
@@ -342,7 +257,7 @@ static void plan_marks(struct pt_builder *builder)
         pt_plan_blend_marks(builder);
     for (uint32_t i = 0; i < plan->instance_count && !none && lazy; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
-        if (!instance->chunk_count || !pt_receives(instance->instance) || (blended && !instance->range))
+        if (!instance->chunk_count || !pt_receives(instance->instance) || (blended && instance->kind == PT_AS_DISCS))
             continue;
         struct mark_args args = {
             .view = pt_view_filled(plan, instance), .id_base = instance->args.id_base, .id_count = instance->args.id_count};
@@ -354,15 +269,6 @@ static void plan_marks(struct pt_builder *builder)
         pt_skip(builder, "mark", "the discs that pixels show are marked");
 }
 
-static void plan_center(struct pt_builder *builder, uint32_t i)
-{
-    const struct center_args args = {.view = builder->plan->view};
-    PT_REASON(PT_ADD(builder, center, args,
-                     {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0), pt_span_of(builder->plan),
-                      pt_plane_at(PT_PLANE_OFFSET, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i)}),
-              "depth of instance %u's surface in the middle of each pixel", i);
-}
-
 static int is_of_points(enum pt_stage stage)
 {
     return stage == PT_STAGE_points || stage == PT_STAGE_ranges || stage == PT_STAGE_measured || stage == PT_STAGE_filling;
@@ -370,9 +276,7 @@ static int is_of_points(enum pt_stage stage)
 
 static int is_planned(const struct pt_plan *plan, enum pt_kernel kernel)
 {
-    int known = 0;
-    for (uint32_t i = 0; i < plan->pass_count; i++)
-        known |= plan->passes[i].kernel == kernel;
+    int known = pt_has_pass(plan, kernel);
     for (uint32_t i = 0; i < plan->skipped_count; i++)
         known |= !strcmp(plan->skipped[i].name, pt_kernels[kernel].name);
     return known;
@@ -387,49 +291,45 @@ static void skip_rest(struct pt_builder *builder, const char *reason, int of_poi
             pt_skip(builder, pt_kernels[k].name, reason);
 }
 
-// Points and discs, with their surfaces.
+static const struct {
+    void (*see)(struct pt_builder *);
+    void (*show)(struct pt_builder *, uint32_t instance);
+    void (*join)(struct pt_builder *);
+    void (*cover)(struct pt_builder *, int shown);
+    void (*front)(struct pt_builder *);
+} work_of[PT_AS_COUNT] = {
+#define PT_X(kind, source, sees, shows, in_planes, see, show, join, cover, front, ...) {see, show, join, cover, front},
+    PT_KINDS(PT_X)
+#undef PT_X
+};
+
+// What the measured pixels show: of all kinds that filling comes behind.
 static void plan_measured(struct pt_builder *builder)
 {
-    struct pt_plan *plan = builder->plan;
-    int estimate = 0, points = 0, discs = 0;
-    for (uint32_t i = 0; i < plan->instance_count; i++) {
-        points |= plan->instances[i].chunk_count && !plan->instances[i].discs;
-        discs |= plan->instances[i].chunk_count && plan->instances[i].discs && !plan->instances[i].range;
-    }
-    if (points)
-        plan_scatter(builder);
-    else if (!plan->cells)
-        pt_skip(builder, "scatter",
-                builder->scene->settings.surface == PATINA_SURFACE_SPLATS ? "the settings ask for discs"
-                                                                          : "all footprints in view are wide enough for discs");
-    if (discs) {
-        pt_plan_splat(builder);
-    } else {
-        const char *reason = plan->cells && !points                                    ? "all clouds in view are range images"
-                             : builder->scene->settings.surface == PATINA_SURFACE_FILL ? "the settings ask for filling"
-                             : plan->discs_count ? "no footprint in view is wide enough for a disc"
-                                                 : "no cloud in view was analysed";
-        pt_skip(builder, "splat", reason);
-        pt_skip(builder, "blend", reason);
-    }
-    pt_plan_ranges(builder);
+    const struct pt_plan *plan = builder->plan;
+    for (int kind = 0; kind < PT_AS_COUNT; kind++)
+        if (work_of[kind].see)
+            work_of[kind].see(builder);
     for (uint32_t i = 0; i < plan->instance_count; i++)
-        if (plan->instances[i].chunk_count && !plan->instances[i].range) {
-            pt_plan_resolve(builder, i);
-            if (builder->layer == 1 && pt_tells_surfaces(builder) && !plan->instances[i].discs)
-                plan_center(builder, i);
-            estimate |= !plan->instances[i].args.has_normals;
-        }
-    if (!pt_tells_surfaces(builder) || !plan->filled)
-        pt_skip(builder, "center",
-                !plan->filled ? "discs have the depth of their surface" : "the depth asked for is the points'");
-    if (!estimate)
-        pt_skip(builder, "normals",
-                points || discs ? "every cloud in view has normals" : "range images have those of their cells");
-    if (!points && !discs)
-        pt_skip(builder, "resolve", "range images tell normals and layer distances themselves");
-    if (discs)
-        pt_plan_blend(builder);
+        if (plan->instances[i].chunk_count && work_of[plan->instances[i].kind].show)
+            work_of[plan->instances[i].kind].show(builder, i);
+    for (int kind = 0; kind < PT_AS_COUNT; kind++)
+        if (work_of[kind].join)
+            work_of[kind].join(builder);
+}
+
+static void plan_covers(struct pt_builder *builder, int shown)
+{
+    for (int kind = 0; kind < PT_AS_COUNT; kind++)
+        if (work_of[kind].cover)
+            work_of[kind].cover(builder, shown);
+}
+
+static void plan_fronts(struct pt_builder *builder)
+{
+    for (int kind = 0; kind < PT_AS_COUNT; kind++)
+        if (work_of[kind].front)
+            work_of[kind].front(builder);
 }
 
 // Scatter, surfaces, filling: what pictures and light maps have in common.
@@ -479,11 +379,11 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     plan_surfaces(builder);
-    pt_plan_meshes(builder, 1);
+    plan_covers(builder, 1);
     pt_plan_average(builder);
     pt_plan_lines(builder);
     plan_shadows(builder);
-    pt_plan_soft_layer(builder);
+    plan_fronts(builder);
     pt_plan_values(builder);
     uint32_t tail = plan->pass_count;
     for (int own = pt_effects_want_albedo(builder->scene); own >= 0; own--) { // normals are shown by the last
@@ -641,7 +541,7 @@ int pt_plan_depth(struct pt_builder *builder)
     if (error || !pt_plan_shows(plan))
         return error;
     plan_surfaces(builder);
-    pt_plan_meshes(builder, 0);
+    plan_covers(builder, 0);
     return builder->failed;
 }
 
@@ -669,11 +569,11 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
         if (pt_plan_shows(plan))
             plan_points(&builder);
         else
-            plan_nothing(&builder, scene->mesh_count        ? "nothing is in view"
+            plan_nothing(&builder, scene->mesh_count     ? "nothing is in view"
                                    : !scene->cloud_count ? "the scene has no cloud"
-                                   : plan->soft_count       ? "everything in view is soft"
-                                   : !plan->chunks          ? "the clouds have no points"
-                                                            : "no cloud is in view");
+                                   : plan->soft_count    ? "everything in view is soft"
+                                   : !plan->chunks       ? "the clouds have no points"
+                                                         : "no cloud is in view");
         error = builder.failed;
     }
     if (error == PATINA_ERROR_MEMORY)

@@ -8,6 +8,7 @@
 #include "device.h"
 #include "expected.h"
 #include "scene/scene.h"
+#include "kinds.h"
 #include "steps.h"
 #include "shared/clips.h"
 #include "shared/colors.h"
@@ -205,8 +206,8 @@ struct pt_plan_instance {
     const struct pt_instance *instance;
     uint32_t of;                  // its place in the scene: shadows are kept by it
     double thinned;               // how much farther apart than its cloud's the points that are drawn lie
-    uint32_t discs;               // 1: its points are discs, or range images: what pixels show is in planes
-    const struct pt_range *range; // range images: their image buffer (ranges.h); NULL: they are none
+    enum pt_kind kind;            // none of PT_AS_MESH: these are pt_plan_mesh
+    const struct pt_range *range; // PT_AS_RANGES: their image buffer (ranges.h)
     struct instance_args args;
     float radius, radius_scale, radius_most, surface_scale; // of discs, as disc_args has them
     struct chunk_view *chunks;                              // those in view
@@ -218,6 +219,11 @@ struct pt_plan_instance {
     int by_class, by_shape, by_mask, by_field, by_scan; // some of them by class, by shape, by mask, by field, by scan
     int marked;                                         // shown with what stations saw through in magenta
 };
+
+static inline int pt_draws(const struct pt_plan_instance *instance, enum pt_kind kind)
+{
+    return instance->kind == kind && instance->chunk_count;
+}
 
 // What one pass draws of the soft points: rows of the picture, a slab of depth, and which instances of the plan hold its points.
 struct pt_soft_part {
@@ -349,6 +355,15 @@ static inline double pt_thinning(const struct patina_scene *scene)
 static inline float pt_sigma_scale(const struct pt_plan_instance *instance)
 {
     return (float)(1.0 / (16.0 * instance->thinned));
+}
+
+// Whether some of the kind is in view, soft points and meshes apart.
+static inline int pt_plan_draws(const struct pt_plan *plan, enum pt_kind kind)
+{
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        if (pt_draws(&plan->instances[i], kind))
+            return 1;
+    return 0;
 }
 
 // Is there anything in view that is no soft point?
@@ -483,8 +498,7 @@ uint32_t pt_veil_slabs(const struct patina_scene *map); // of a soft group's sce
 // A scene of the group's casters as a sample of the light sees them, for pt_plan_depth. instances: room for the scene's. The
 // window is what of the map counts, in window units: left, bottom, right, top. 0: there is nothing to see.
 int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
-                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out,
-                   double window[4]);
+                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out, double window[4]);
 
 // What a light's texture depends on, in a fixed order: integers as such, lengths and angles relative to the light.
 // Returns the count of numbers; writes at most `room`.

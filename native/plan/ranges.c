@@ -138,8 +138,10 @@ static void add_cells(struct pt_builder *builder, uint32_t i, const struct pt_ra
               (double)range->pixel);
     const struct scatter_args scatter = {
         .view = range->cells, .instances = 1, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
-    PT_REASON(PT_ADD(builder, scatter, scatter,
-                     {keys, beyond, drawn, chunks, pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFELS, i)}),
+    struct pt_ref of_points[3 + PT_KIND_BUFFERS] = {keys, beyond, drawn};
+    const uint32_t count = 3 + pt_bind_kind(PT_AS_RANGES, i, of_points + 3);
+    of_points[3] = chunks; // of the cells at hand
+    PT_REASON(pt_add(builder, PT_KERNEL_scatter, "scatter", &scatter, sizeof scatter, of_points, count),
               "%llu points in %u chunks of instance %u, into cells", (unsigned long long)instance->points,
               instance->chunk_count, i);
     const struct merge_args merge = {.view = range->cells,
@@ -244,7 +246,7 @@ void pt_plan_reveal(struct pt_builder *builder)
     args.view.rect[3] = plan->crop[1] + plan->crop[3];
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
-        if (!instance->range || !instance->chunk_count || !differs(builder, instance))
+        if (!pt_draws(instance, PT_AS_RANGES) || !differs(builder, instance))
             continue;
         args.instance = instance->args;
         PT_REASON(PT_ADD(builder, reveal, args,
@@ -268,10 +270,10 @@ void pt_plan_ranges(struct pt_builder *builder)
     }
     int apart = 0;
     for (uint32_t i = 0; i < plan->instance_count; i++)
-        apart |= plan->instances[i].range && plan->instances[i].chunk_count && differs(builder, &plan->instances[i]);
+        apart |= pt_draws(&plan->instances[i], PT_AS_RANGES) && differs(builder, &plan->instances[i]);
     if (!apart)
         pt_skip(builder, "differ", "no pass asks how far scans lie apart, or no cloud in view knows its scans");
     for (uint32_t i = 0; i < plan->instance_count; i++)
-        if (plan->instances[i].range && plan->instances[i].chunk_count)
+        if (pt_draws(&plan->instances[i], PT_AS_RANGES))
             add_range(builder, i, builder->layer > 1 || builder->behind);
 }

@@ -67,7 +67,7 @@ static struct reopen_args *arguments_of(struct pt_builder *builder, uint32_t i, 
                                  .id_base = instance->args.id_base,
                                  .id_count = instance->args.id_count,
                                  .phase = phase,
-                                 .discs = instance->discs,
+                                 .discs = (uint32_t)pt_kinds[instance->kind].in_planes,
                                  .stations = sights->count,
                                  .eye_z = pt_eye_z(builder->scene)};
     for (int k = 0; k < 9; k++)

@@ -98,7 +98,7 @@ static int place_instance(struct placing *p, uint32_t i)
     struct pt_object object;
     double rows[9];
     int error = PATINA_OK;
-    *out = (struct pt_plan_instance){.instance = instance, .of = i, .marked = pt_is_marked(instance)};
+    *out = (struct pt_plan_instance){.kind = PT_AS_SOFT, .instance = instance, .of = i, .marked = pt_is_marked(instance)};
     out->chunks = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->bounds);
     struct depths *depths = p->depths[p->plan->soft_count] = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *depths);
@@ -329,11 +329,14 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
         args.weight = style->soft == PATINA_SOFT_FIELD ? fminf(1.0f / (style->soft_modulation * PT_FIELD_MOST), 1.0f)
                                                        : fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
     const enum pt_instance_buffer colors = args.shade.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
-    struct pt_pass *pass = PT_ADD(
-        builder, gather, args,
-        {pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
-         pt_buffer_of(PT_SURFELS, i), pt_field_of(instance, i), pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i),
-         late ? pt_buffer_of(PT_SHADOWS, instance->of) : pt_nothing(), args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()});
+    struct pt_ref refs[6 + PT_KIND_BUFFERS] = {pt_plane_at(PT_PLANE_SOFT_POINTS, 0)};
+    uint32_t count = 1 + pt_bind_kind(PT_AS_SOFT, i, refs + 1);
+    refs[count++] = pt_field_of(instance, i);
+    refs[count++] = pt_buffer_of(colors, i);
+    refs[count++] = pt_buffer_of(PT_OPACITIES, i);
+    refs[count++] = late ? pt_buffer_of(PT_SHADOWS, instance->of) : pt_nothing();
+    refs[count++] = args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
+    struct pt_pass *pass = pt_add(builder, PT_KERNEL_gather, "gather", &args, sizeof args, refs, count);
     pass->late = late;
     PT_REASON(pass, "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,
               args.shade.instance.lit ? "lit" : "unlit");

@@ -25,22 +25,21 @@ int pt_tells_depths(const struct pt_builder *builder)
 int pt_blends_light(const struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    int some = 0; // range images have words of the nearest point
-    for (uint32_t i = 0; i < plan->instance_count; i++)
-        some |= plan->instances[i].chunk_count && plan->instances[i].discs && !plan->instances[i].range;
-    return some && builder->scene->settings.surface == PATINA_SURFACE_SPLATS && plan->light_count &&
+    return pt_plan_draws(plan, PT_AS_DISCS) && // range images have words of the nearest point
+           builder->scene->settings.surface == PATINA_SURFACE_SPLATS && plan->light_count &&
            (uint64_t)plan->view.width * plan->view.height * plan->light_count <= UINT32_MAX; // else words of the nearest disc's
 }
 
 // Binds what both kernels read of an instance; `blend`, if there is one, reads colours too, or marks or shadows.
 static uint32_t bind_instance(struct pt_ref *refs, const struct pt_plan *plan, uint32_t i, const struct blend_args *blend)
 {
-    static const enum pt_instance_buffer list[] = {PT_CHUNKS, PT_POSITIONS, PT_SURFELS, PT_RADII, PT_COLORS, PT_OPACITIES};
-    const uint32_t count = blend ? 6 : 4, of = plan->instances[i].of;
-    for (uint32_t k = 0; k < count; k++)
-        refs[k] = pt_buffer_of(list[k], i);
-    if (blend && blend->part != PT_BLEND_COLORS)
-        refs[4] = pt_buffer_of(blend->part == PT_BLEND_MARKS ? PT_MARKS : PT_SHADOWS, of);
+    uint32_t count = pt_bind_kind(PT_AS_DISCS, i, refs);
+    if (!blend)
+        return count;
+    refs[count++] = blend->part == PT_BLEND_COLORS  ? pt_buffer_of(PT_COLORS, i)
+                    : blend->part == PT_BLEND_MARKS ? pt_buffer_of(PT_MARKS, plan->instances[i].of)
+                                                    : pt_buffer_of(PT_SHADOWS, plan->instances[i].of);
+    refs[count++] = pt_buffer_of(PT_OPACITIES, i);
     return count;
 }
 
@@ -72,7 +71,7 @@ static int list_discs(struct pt_builder *builder, const struct blend_args *blend
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         const struct patina_cloud *cloud = instance->instance->cloud;
-        if (!instance->chunk_count || !instance->discs || instance->range)
+        if (!pt_draws(instance, PT_AS_DISCS))
             continue;
         discs[out->instances++] = (struct disc_args){.instance = instance->args,
                                                      .has_radii = cloud->info.has_radii ? PT_RADII_FLOATS
@@ -97,6 +96,16 @@ void pt_plan_splat(struct pt_builder *builder)
     const int behind = builder->layer > 1 || builder->behind;
     const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_if(behind, PT_PLANE_LIMIT, 0)};
     struct disc_pass discs;
+    if (!pt_plan_draws(plan, PT_AS_DISCS)) {
+        const int points = pt_plan_draws(plan, PT_AS_POINTS);
+        const char *reason = plan->cells && !points                                    ? "all clouds in view are range images"
+                             : builder->scene->settings.surface == PATINA_SURFACE_FILL ? "the settings ask for filling"
+                             : plan->discs_count ? "no footprint in view is wide enough for a disc"
+                                                 : "no cloud in view was analysed";
+        pt_skip(builder, "splat", reason);
+        pt_skip(builder, "blend", reason);
+        return;
+    }
     if (!list_discs(builder, NULL, sizeof(struct splat_args), planes, sizeof planes / sizeof *planes, &discs))
         return;
     const struct splat_args args = {
@@ -129,6 +138,8 @@ static struct pt_pass *add_blend(struct pt_builder *builder, struct blend_args a
 
 void pt_plan_blend(struct pt_builder *builder)
 {
+    if (!pt_plan_draws(builder->plan, PT_AS_DISCS))
+        return;
     const int depths = pt_tells_depths(builder);
     const struct pt_ref planes[] = {pt_keys_of(builder, 0),          pt_plane_at(PT_PLANE_DEFF, 0),
                                     pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_ALBEDO, 0),

@@ -349,7 +349,7 @@ static void place_fine(const struct survey *survey, uint32_t i, const struct pt_
 // Instance i of the scene, its wide chunks or the others. Ids are moved by id_base. range: its image buffer, in whose cells points
 // are projected, or NULL.
 static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i,
-                        uint32_t wide, uint32_t id_base, struct pt_range *range, struct pt_plan_instance *out)
+                        enum pt_kind kind, uint32_t id_base, struct pt_range *range, struct pt_plan_instance *out)
 {
     const struct pt_instance *instance = &scene->instances[i];
     const struct pt_eye *eye = range ? &range->eye : &survey->camera;
@@ -359,7 +359,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     out->instance = instance;
     out->of = i;
     out->thinned = thinned;
-    out->discs = wide;
+    out->kind = kind;
     out->marked = pt_is_marked(instance);
     out->radius = (float)fmin((double)instance->style.radius * thinned, (double)PT_DISC_MOST);
     out->radius_most = (float)radius_most(instance, thinned);
@@ -379,7 +379,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         const double *bounds = seen->extent.rect,
                      around[4] = {bounds[0] - faces, bounds[1] - faces, bounds[2] + faces, bounds[3] + faces};
         uint32_t *rect = out->bounds[out->chunk_count].rect, cells[4];
-        if (seen->wide != wide || !pt_rect_in_window(&plan->view, around, plan->guard, rect))
+        if (seen->wide != (kind != PT_AS_POINTS) || !pt_rect_in_window(&plan->view, around, plan->guard, rect))
             continue;
         uint32_t count = pt_drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
@@ -418,7 +418,7 @@ static int place_range(const struct patina_scene *scene, struct pt_plan *plan, c
     for (struct pt_range *fine = range->fine; fine; fine = fine->fine)
         if (!(fine->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *fine->chunks)))
             return PATINA_ERROR_MEMORY;
-    return place_chunks(scene, plan, survey, i, 1, pt_disc_ids(scene), range, &plan->instances[i]);
+    return place_chunks(scene, plan, survey, i, PT_AS_RANGES, pt_disc_ids(scene), range, &plan->instances[i]);
 }
 
 static int place_instance(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i)
@@ -431,11 +431,12 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     plan->points += cloud->info.count;
     if (survey->cells[i].count)
         return place_range(scene, plan, survey, i);
-    int error = place_chunks(scene, plan, survey, i, all, 0, NULL, &plan->instances[i]);
+    int error = place_chunks(scene, plan, survey, i, all ? PT_AS_DISCS : PT_AS_POINTS, 0, NULL, &plan->instances[i]);
     for (uint32_t k = 0; k < survey->seen_count[i] && !all; k++)
         wide |= survey->seen[i][k].wide;
     if (!error && wide)
-        error = place_chunks(scene, plan, survey, i, 1, plan->discs_first, NULL, &plan->instances[plan->instance_count++]);
+        error = place_chunks(scene, plan, survey, i, PT_AS_DISCS, plan->discs_first, NULL,
+                             &plan->instances[plan->instance_count++]);
     return error;
 }
 
@@ -457,8 +458,8 @@ static void plan_texture(const struct pt_plan *plan, const struct pt_instance *i
     memcpy(out->sizes, texture->sizes, sizeof out->sizes);
 }
 
-static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const struct pt_instance *instance,
-                       uint32_t id_base, struct pt_plan_mesh *out)
+static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const struct pt_instance *instance, uint32_t id_base,
+                       struct pt_plan_mesh *out)
 {
     const struct patina_mesh *mesh = instance->mesh;
     struct pt_object object;
@@ -502,7 +503,8 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
         error = look_at_instance(scene, plan, survey, i);
     for (uint32_t i = 0; i < scene->mesh_count && !plan->map; i++)
-        plan->transparent |= pt_mesh_at(scene, i)->mesh_style.alpha == PATINA_ALPHA_BLEND && pt_mesh_drawn(pt_mesh_at(scene, i)->mesh);
+        plan->transparent |= pt_mesh_at(scene, i)->mesh_style.alpha == PATINA_ALPHA_BLEND &&
+                             pt_mesh_drawn(pt_mesh_at(scene, i)->mesh);
     survey->camera = bare;
     struct pt_spread spread = {.middle = plan->spacing_middle, .most = plan->spacing_px};
     if (!error)

@@ -15,7 +15,7 @@ const char *pt_parts_refused(const struct patina_scene *scene, const struct pt_p
 {
     int ranges = plan->cells > 0;
     for (uint32_t i = 0; i < plan->instance_count; i++)
-        ranges |= plan->instances[i].range != NULL;
+        ranges |= plan->instances[i].kind == PT_AS_RANGES;
     return ranges                               ? "range images are"
            : plan->soft_count                   ? "soft points are"
            : scene->settings.pixel_samples > 1  ? "samples of pixels are"

@@ -644,9 +644,80 @@ static void test_passes_bind_what_their_kernels_list(void **state)
     pt_plan_destroy(&plan);
 }
 
+// What of the kind the plan has: passes that find it, that bind what its row says of an instance, and that tell what it shows.
+static void check_kind(const struct pt_plan *plan, enum pt_kind kind, int drawn)
+{
+    const struct pt_kind_row *row = &pt_kinds[kind];
+    const enum pt_kernel binds = row->sees == PT_KERNEL_coarsen ? PT_KERNEL_scatter : row->sees;
+    const uint32_t of = row->source == PT_SOURCE_MESH ? PT_OF_MESH : PT_OF_INSTANCE;
+    uint32_t bound = 0, of_kind = 0;
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        of_kind += (uint32_t)pt_draws(&plan->instances[i], kind);
+    if (kind != PT_AS_SOFT && kind != PT_AS_MESH)
+        assert_int_equal(of_kind > 0, drawn);
+    if (!drawn) {
+        assert_true(kind == PT_AS_POINTS || !passes_of(plan, row->sees)); // range images are scattered, too
+        return;
+    }
+    assert_true(passes_of(plan, row->sees) && passes_of(plan, row->shows));
+    for (uint32_t i = 0; i < plan->pass_count; i++)
+        for (uint32_t k = 0; plan->passes[i].kernel == binds && k < plan->passes[i].ref_count; k++)
+            for (uint32_t b = 0; b < row->buffer_count; b++)
+                bound |= (uint32_t)(plan->passes[i].refs[k].of == of && plan->passes[i].refs[k].which == row->buffers[b]) << b;
+    assert_int_equal(bound, (1u << row->buffer_count) - 1);
+}
+
+// Points, range images, soft points and a mesh beside each other, then discs; a scene's clouds keep their numbers, whenever meshes come.
+static void test_every_kind_has_its_passes(void **state)
+{
+    (void)state;
+    static const float corners[3][3] = {{-1, -1, 0.5f}, {1, -1, 0.5f}, {0, 1, 0.5f}};
+    static const uint32_t indices[3] = {0, 1, 2};
+    const patina_mesh_desc desc = {
+        .struct_size = sizeof desc,
+        .vertex_count = 3,
+        .triangle_count = 1,
+        .position = {corners, PATINA_FLOAT32, 3, 0},
+        .indices = indices,
+    };
+    patina_mesh *mesh = NULL;
+    patina_cloud *cloud = square(1);
+    assert_int_equal(patina_mesh_create(&desc, &mesh), PATINA_OK);
+    const patina_cloud_style styles[] = {
+        {.struct_size = sizeof *styles},
+        {.struct_size = sizeof *styles, .surface = PATINA_SURFACE_RANGES},
+        {.struct_size = sizeof *styles, .soft = PATINA_SOFT_ALL, .soft_radius = 0.1f},
+    };
+    for (int splats = 0; splats < 2; splats++) {
+        const patina_settings settings = {.struct_size = sizeof settings,
+                                          .width = 64,
+                                          .height = 64,
+                                          .surface = splats ? PATINA_SURFACE_SPLATS : PATINA_SURFACE_FILL};
+        patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
+        assert_int_equal(patina_scene_add_mesh(scene, mesh, NULL), PATINA_OK);
+        for (uint32_t i = 1; i < 3 && !splats; i++) {
+            assert_int_equal(patina_scene_add_cloud(scene, cloud, &styles[i]), PATINA_OK);
+            assert_int_equal(scene->instances[i].style.soft, styles[i].soft);
+        }
+        assert_int_equal(patina_scene_add_mesh(scene, mesh, NULL), PATINA_OK);
+        for (uint32_t i = 0; i < scene->cloud_count + scene->mesh_count; i++)
+            assert_int_equal(scene->instances[i].source, i < scene->cloud_count ? PT_SOURCE_CLOUD : PT_SOURCE_MESH);
+        assert_int_equal(pt_mesh_at(scene, 1)->id_base, 1); // triangles before it
+        assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+        struct pt_plan plan = plan_of(scene);
+        for (int kind = 0; kind < PT_AS_COUNT; kind++)
+            check_kind(&plan, (enum pt_kind)kind, kind == PT_AS_MESH || (kind == PT_AS_DISCS) == splats);
+        pt_plan_destroy(&plan);
+        patina_scene_destroy(scene);
+    }
+    patina_mesh_destroy(mesh);
+    patina_cloud_destroy(cloud);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_every_kind_has_its_passes),
         cmocka_unit_test(test_lines_are_planned_where_asked_for),
         cmocka_unit_test(test_every_pass_runs_or_has_a_reason),
         cmocka_unit_test(test_missing_normals_are_estimated),
