@@ -110,7 +110,7 @@ struct patina_device {
 };
 
 // Constructors; each returns PATINA_ERROR_UNSUPPORTED with the reason at the thread when it cannot be had.
-int pt_device_cpu_create(const patina_device_desc *desc, const char *level, struct patina_device **out);
+int pt_device_cpu_create(const patina_device_desc *desc, const char *isa, struct patina_device **out);
 int pt_device_gl_create(const patina_device_desc *desc, const char *context, struct patina_device **out);
 
 #endif

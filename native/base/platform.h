@@ -69,7 +69,7 @@ int pt_watch_interrupts(void (*interrupted)(void));
 
 double pt_milliseconds(void); // of a clock that only goes forward
 uint32_t pt_core_count(void); // that this process may use, at least 1
-// What vector instructions the processor has and the system keeps; each x86 level has those before it.
+// What vector instructions the processor has and the system keeps; each of x86 has those before it.
 enum pt_vectors { PT_VECTORS_NONE, PT_VECTORS_SSE42, PT_VECTORS_AVX2, PT_VECTORS_AVX512, PT_VECTORS_NEON };
 enum pt_vectors pt_processor_vectors(void);
 void pt_processor_name(char *text, size_t size); // as its maker calls it; "processor" where that is not known

@@ -69,34 +69,34 @@ struct pt_cpu_pass {
 };
 typedef int pt_cpu_tail(const struct pt_cpu_pass *passes, uint32_t count);
 
-// The levels that this build has, the best first: X(name, whether the processor knows it). Kernels are compiled once for each
+// The instruction sets that this build has, the best first: X(name, whether the processor knows it). Kernels are compiled once for each
 // (build/CMakeLists.txt), as PT_ISA.
 #if defined(PT_ONLY_SCALAR)
-#define PT_EACH_LEVEL(X) X(scalar, 1)
+#define PT_EACH_ISA(X) X(scalar, 1)
 #elif defined(__aarch64__)
-#define PT_EACH_LEVEL(X) X(neon, 1) X(scalar, 1)
+#define PT_EACH_ISA(X) X(neon, 1) X(scalar, 1)
 #else
-#define PT_EACH_LEVEL(X)                                                                                                       \
+#define PT_EACH_ISA(X)                                                                                                         \
     X(avx512, pt_processor_vectors() >= PT_VECTORS_AVX512)                                                                     \
     X(avx2, pt_processor_vectors() >= PT_VECTORS_AVX2)                                                                         \
     X(sse42, pt_processor_vectors() >= PT_VECTORS_SSE42)                                                                       \
     X(scalar, 1)
 #endif
 
-// What a level gives the device: level.c.
-struct pt_cpu_level {
+// What an instruction set gives the device: isa.c.
+struct pt_cpu_isa {
     const char *name;
     pt_cpu_kernel *kernels[PT_KERNEL_COUNT];
     pt_cpu_tail *tail;
 };
-#define PT_X(level, known) extern const struct pt_cpu_level pt_cpu_level_##level;
-PT_EACH_LEVEL(PT_X)
+#define PT_X(isa, known) extern const struct pt_cpu_isa pt_cpu_isa_##isa;
+PT_EACH_ISA(PT_X)
 #undef PT_X
 
-#ifdef PT_ISA // within a level
+#ifdef PT_ISA // within one
 #define PT_CONCAT_(a, b) a##b
 #define PT_CONCAT(a, b) PT_CONCAT_(a, b)
-// The name of this level's variant of a kernel's entry: pt_kernel_scatter_avx2.
+// The name of this one's variant of a kernel's entry: pt_kernel_scatter_avx2.
 #define PT_KERNEL_ENTRY(name) PT_CONCAT(pt_kernel_##name##_, PT_ISA)
 #define PT_X(name) pt_cpu_kernel PT_KERNEL_ENTRY(name);
 PT_EACH_KERNEL(PT_X)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The CPU device: buffers are memory, kernels are functions of the best level that the processor has.
+// The CPU device: buffers are memory, kernels are functions of the best instruction set that the processor has.
 #include "cpu.h"
 #include "base/platform.h"
 #include "tables.h"
@@ -10,19 +10,19 @@
 
 struct cpu_device {
     struct patina_device base;
-    const struct pt_cpu_level *level;
+    const struct pt_cpu_isa *isa;
     struct pt_pool *pool;
     struct pt_cpu_scratch scratch[PT_CPU_SCRATCHES];
 };
 
-// The best level first that this processor has; ends with the scalar one.
-static uint32_t available_levels(const struct pt_cpu_level *levels[4])
+// The best instruction set first that this processor has; ends with the scalar one.
+static uint32_t available_isas(const struct pt_cpu_isa *isas[4])
 {
     uint32_t count = 0;
-#define PT_X(level, known)                                                                                                     \
+#define PT_X(isa, known)                                                                                                       \
     if (known)                                                                                                                 \
-        levels[count++] = &pt_cpu_level_##level;
-    PT_EACH_LEVEL(PT_X)
+        isas[count++] = &pt_cpu_isa_##isa;
+    PT_EACH_ISA(PT_X)
 #undef PT_X
     return count;
 }
@@ -115,7 +115,7 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
                                      .cancel = cancel,
                                      .scratch = cpu->scratch};
     (void)argument_size;
-    int error = cpu->level->kernels[kernel](&call);
+    int error = cpu->isa->kernels[kernel](&call);
     if (error == PATINA_ERROR_MEMORY)
         return pt_fail(&device->handle, error, "%s: out of memory for the scratch of kernel %s", device->info.name,
                        pt_kernels[kernel].name);
@@ -135,7 +135,7 @@ static int cpu_run_tail(struct patina_device *device, const struct pt_bound_pass
                                          .pool = cpu->pool,
                                          .scratch = cpu->scratch}};
     if (!error)
-        error = cpu->level->tail(bound, count);
+        error = cpu->isa->tail(bound, count);
     free(bound);
     if (error)
         return pt_fail(&device->handle, error, "%s: out of memory for rows of the picture", device->info.name);
@@ -176,31 +176,31 @@ static const struct pt_device_ops cpu_ops = {
     .watch = cpu_watch,
 };
 
-int pt_device_cpu_create(const patina_device_desc *desc, const char *level, struct patina_device **out)
+int pt_device_cpu_create(const patina_device_desc *desc, const char *isa, struct patina_device **out)
 {
     static struct pt_once once;
-    const struct pt_cpu_level *levels[4];
-    uint32_t count = available_levels(levels), chosen = 0;
+    const struct pt_cpu_isa *isas[4];
+    uint32_t count = available_isas(isas), chosen = 0;
     pt_once(&once, pt_cpu_tables_fill);
-    while (chosen < count && strcmp(level, "cpu") != 0 && strcmp(level, levels[chosen]->name) != 0)
+    while (chosen < count && strcmp(isa, "cpu") != 0 && strcmp(isa, isas[chosen]->name) != 0)
         chosen++;
     if (chosen == count)
-        return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED, "device %s: this processor or build has no such level", level);
+        return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED, "device %s: this processor or build has no such instruction set", isa);
 
     struct cpu_device *cpu = calloc(1, sizeof *cpu);
     struct pt_pool *pool = pt_pool_create(desc->threads, desc->batch);
     if (!cpu || !pool) {
         free(cpu);
         pt_pool_destroy(pool);
-        return pt_fail(NULL, PATINA_ERROR_MEMORY, "device %s: no memory or threads for %u workers", level, desc->threads);
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "device %s: no memory or threads for %u workers", isa, desc->threads);
     }
     pt_handle_init(&cpu->base.handle);
     cpu->base.ops = &cpu_ops;
-    cpu->level = levels[chosen];
+    cpu->isa = isas[chosen];
     cpu->pool = pool;
     cpu->base.memory_cap = desc->memory_cap;
     cpu->base.info = (patina_device_info){.struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool)};
-    snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", cpu->level->name);
+    snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", cpu->isa->name);
     pt_processor_name(cpu->base.info.description, sizeof cpu->base.info.description);
     *out = &cpu->base;
     return PATINA_OK;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One vector vocabulary for every CPU level. Compilers do not vectorise a gather-test-scatter by themselves, so kernels are
+// One vector vocabulary for every instruction set of the processor. Compilers do not vectorise a gather-test-scatter by themselves, so kernels are
 // written with these types; PT_LANES is 16, 8, 4 or 1. vf: floats, vi: 32-bit integers, vm: a mask of lanes.
 // Every operation gives the same bits at every width; there is no fused multiply-add and no reciprocal estimate.
 #ifndef PT_SIMD_H
@@ -33,8 +33,8 @@ static inline vf vf_zero(void) { return vf_set(0.0f); }
 #include "simd/unmasked.h"
 #endif
 
-// ---- the same for every level -----------------------------------------------------------------------------------------
-// Those that levels have by themselves:
+// ---- the same for every one -----------------------------------------------------------------------------------------
+// Those that instruction sets have by themselves:
 //   vi_gather_bytes: bytes at base + i: the word that starts there (three bytes beyond the last may be read).
 //   vi_gather_two_z: upper words of keys i and i + 1.
 //   vf_load4, vf_store4: PT_LANES float4 pixels <-> four vectors; bit i of lanes: pixel i is written.
@@ -43,10 +43,10 @@ static inline vf vf_zero(void) { return vf_set(0.0f); }
 //   vi_least_keys: keys[i] = min(keys[i], z << 32 | id), of the first half of the lanes; of the others at keys + apart. No key's first
 //     bit is set. PT_KEYS_AT_ONCE lie in one vector: where they begin at its multiples, what is written is read again soon.
 
-// Eight floats or integers side by side at every level: what is summed for a pixel. Not a vector of lanes.
+// Eight floats or integers side by side whatever the instruction set: what is summed for a pixel. Not a vector of lanes.
 typedef float vf_eight __attribute__((vector_size(32), aligned(4), may_alias));
 typedef int32_t vi_eight __attribute__((vector_size(32), aligned(4), may_alias));
-// Words of bits side by side, four at every level: what planes of bits are worked on by.
+// Words of bits side by side, four at every one: what planes of bits are worked on by.
 typedef uint64_t vi_words __attribute__((vector_size(32), aligned(8), may_alias));
 
 static inline vi vi_gather_id(const uint64_t *keys, vi i, vm m) // lower words of keys

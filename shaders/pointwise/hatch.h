@@ -61,9 +61,9 @@ PT_BODY(hatch)
     precise vf facing = (HERE.normal[0] * p.ray[0] + HERE.normal[1] * p.ray[1]) + HERE.normal[2] * p.ray[2];
     precise vf back = facing * vf_rcp(vf_max(facing * facing, vf_set(PT_HATCH_GRAZING)));
     p.back = back;
-    precise vf light = (0.2126f * color[0] + 0.7152f * color[1]) + 0.0722f * color[2];
-    light = light * vf_rcp(vf_max(color[3], vf_set(1e-6f)));
-    precise vf tone = light * vf_rsqrt(vf_max(light, vf_set(1e-6f))); // as the eye has it
+    precise vf brightness = (0.2126f * color[0] + 0.7152f * color[1]) + 0.0722f * color[2];
+    brightness = brightness * vf_rcp(vf_max(color[3], vf_set(1e-6f)));
+    precise vf tone = brightness * vf_rsqrt(vf_max(brightness, vf_set(1e-6f))); // as the eye has it
     precise vf bare = one;
     for (uint32_t level = 0u; level < ARGS.levels; level++) {
         precise vf dark = vf_min(vf_max(1.0f - tone * ARGS.tones[level], zero), one);

@@ -9,10 +9,10 @@ PT_FUNCTION vf toon_luminance(vf r, vf g, vf b)
     return sum;
 }
 
-// The light of a band, given the light.
-PT_FUNCTION vf toon_band(PT_TAKES(toon) vf light)
+// How bright a band is, given how bright the pixel is.
+PT_FUNCTION vf toon_band(PT_TAKES(toon) vf brightness)
 {
-    precise vf root = light * vf_rsqrt(vf_max(light, vf_set(PT_TOON_DARK))); // as the eye has it
+    precise vf root = brightness * vf_rsqrt(vf_max(brightness, vf_set(PT_TOON_DARK))); // as the eye has it
     precise vf at = root * ARGS.bands + 0.5f;
     vf whole = vf_floor(at);
     precise vf edge = vf_min(vf_max((at - whole - 0.5f) * ARGS.steepness + 0.5f, vf_set(0.0f)), vf_set(1.0f));
@@ -27,12 +27,12 @@ PT_BODY(toon)
     vf dark = vf_set(PT_TOON_DARK), one = vf_set(1.0f);
     vf own = toon_luminance(HERE.albedo[0], HERE.albedo[1], HERE.albedo[2]);
     vm some = vf_lt(dark, own); // black has no light to be seen by
-    precise vf light = toon_luminance(color[0], color[1], color[2]) * vf_rcp(vf_select(some, own, one));
-    vm lit = vf_lt(dark, light);
-    light = vf_select(some, light, one);
-    precise vf band = toon_band(PT_GIVES light), ratio = band * vf_rcp(vf_select(lit, light, one));
+    precise vf brightness = toon_luminance(color[0], color[1], color[2]) * vf_rcp(vf_select(some, own, one));
+    vm bright_enough = vf_lt(dark, brightness);
+    brightness = vf_select(some, brightness, one);
+    precise vf band = toon_band(PT_GIVES brightness), ratio = band * vf_rcp(vf_select(bright_enough, brightness, one));
     for (int k = 0; k < 3; k++) {
         precise vf bright = color[k] * ratio, dim = HERE.albedo[k] * band;
-        color[k] = vf_select(some, vf_select(lit, bright, dim), color[k]);
+        color[k] = vf_select(some, vf_select(bright_enough, bright, dim), color[k]);
     }
 }

@@ -50,11 +50,11 @@ struct obscure_args {
     float turns[2 * PT_OBSCURE_TURNS]; // cosine, sine
 };
 
-#define PT_TOON_DARK 1e-6f // less albedo or light than this is none
+#define PT_TOON_DARK 1e-6f // less albedo or brightness than this is none
 
-// toon: bands of light over colours as they are. light = luminance of the colour / that of the albedo; its root times `bands`
+// toon: bands of light over colours as they are. brightness = luminance of the colour / that of the albedo; its root times `bands`
 // (their number less 1/2, so that full light is in the middle of the last) goes in steps of 1, each a smooth step 1 / steepness
-// wide; the first band is the darkest there is. Colour times band / light.
+// wide; the first band is the darkest there is. Colour times band / brightness.
 struct toon_args {
     struct view_args view;
     float bands, inverse; // inverse: 1 / bands

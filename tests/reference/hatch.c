@@ -55,8 +55,8 @@ struct ref_color ref_hatch(const struct hatch_args *args, const struct ref_plane
         p.ys *= z;
     }
     const float *c = planes->color + 4 * pixel;
-    double alpha = c[3], light = (0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]) / fmax(alpha, 1e-6);
-    double tone = light / sqrt(fmax(light, 1e-6));
+    double alpha = c[3], brightness = (0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]) / fmax(alpha, 1e-6);
+    double tone = brightness / sqrt(fmax(brightness, 1e-6));
     for (int level = 0; level < (int)args->levels; level++) {
         double dark = fmin(fmax(1.0 - tone * args->tones[level], 0.0), 1.0), error;
         double dark_error = 24.0 * TOL_UNIT * (1.0 + tone * args->tones[level]);

@@ -99,7 +99,7 @@ def levels_of(tool):
     known = []
     for name in names:
         done = subprocess.run([*tool, "render", "-o", "/dev/null", "--device", name, "/dev/null"], capture_output=True, text=True)
-        if "no such level" not in done.stderr:
+        if "no such instruction set" not in done.stderr:
             known.append(name)
     return known
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Vectors answer as the header says where processors differ: minimum and maximum of what is not a number and of two zeros,
-// conversion of what no integer holds, shifts, packing. Compiled for the first level with vectors that the processor has.
+// conversion of what no integer holds, shifts, packing. Compiled for the first instruction set with vectors that the processor has.
 #include "device_cpu/cpu.h"
 #include "device_cpu/simd.h"
 

@@ -2,7 +2,7 @@
 // blend: normal and colour of the discs that lie on the nearest surface of each pixel, or which they are, or the light that arrives at
 // them. SPEC 5, solid; twin of shaders/kernels/blend.comp
 //
-// Tile by tile. The sums of a pixel lie side by side, one vector whatever the level; they are 32 bits wide and emptied into
+// Tile by tile. The sums of a pixel lie side by side, one vector whatever the instruction set; they are 32 bits wide and emptied into
 // 64 before they could overflow.
 #include "bins.h"
 #include "sums.h"

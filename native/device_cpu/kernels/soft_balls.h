@@ -7,7 +7,7 @@
 
 enum {
     PT_SOFT_NUMBERS = 10, // floats kept of a ball
-    PT_SOFT_SUMS = 16     // the most lanes of any level
+    PT_SOFT_SUMS = 16     // the most lanes of any instruction set
 };
 
 // Of the balls that a pixel's ray meets; room for a list, and PT_LANES more.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What levels of 4 lanes do alike, once their vectors are known: SSE4.2 and NEON.
+// What instruction sets of 4 lanes do alike, once their vectors are known: SSE4.2 and NEON.
 #ifndef PT_SIMD_FOUR_H
 #define PT_SIMD_FOUR_H
 

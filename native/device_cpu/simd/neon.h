@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // NEON of 64-bit ARM: 4 lanes. Where its operations answer otherwise than x86's, the latter's answer is given: the second of two of
-// which one is not a number, 0x80000000 for what no integer holds (tests/unit/test_simd.c, which holds one level of each processor to it).
+// which one is not a number, 0x80000000 for what no integer holds (tests/unit/test_simd.c, which holds one instruction set of each processor to it).
 #ifndef PT_SIMD_NEON_H
 #define PT_SIMD_NEON_H
 

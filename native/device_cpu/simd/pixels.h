@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pixels of four floats and keys, for every level of more than a lane.
+// Pixels of four floats and keys, for every instruction set of more than a lane.
 #ifndef PT_SIMD_PIXELS_H
 #define PT_SIMD_PIXELS_H
 

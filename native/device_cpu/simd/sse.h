@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the levels of x86 load alike, before their vectors are known.
+// What the instruction sets of x86 load alike, before their vectors are known.
 #ifndef PT_SIMD_SSE_H
 #define PT_SIMD_SSE_H
 
