@@ -356,8 +356,7 @@ static uint32_t fit(double *low, double *high, double texel, uint32_t most)
 }
 
 int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
-                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out,
-                   double window[4])
+                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out, double window[4])
 {
     double axes[9], position[3];
     int parallel = light->light->type == PATINA_LIGHT_SUN;
@@ -513,8 +512,8 @@ int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, u
     static const char *const names[] = {"", "sun", "point light", "spot", "area light"};
     struct pt_plan_light *planned = &plan->lights[i];
     struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (3 * (size_t)scene->cloud_count + 1) * sizeof *groups);
-    struct pt_instance *instances =
-        pt_arena_take(&plan->arena, ((size_t)scene->cloud_count + scene->mesh_count + 1) * sizeof *instances);
+    struct pt_instance *instances = pt_arena_take(&plan->arena,
+                                                  ((size_t)scene->cloud_count + scene->mesh_count + 1) * sizeof *instances);
     if (!groups || !instances || pt_plan_light_map(scene, plan, i))
         return PATINA_ERROR_MEMORY;
     struct patina_scene view = {0}; // its first map
@@ -607,7 +606,7 @@ static void put_matrix(struct key *key, const struct patina_scene *scene, const 
                        const double matrix[16])
 {
     const double *first = scene->cloud_count ? scene->instances[0].style.world_from_object
-                                                : pt_mesh_at(scene, 0)->mesh_style.world_from_object;
+                                             : pt_mesh_at(scene, 0)->mesh_style.world_from_object;
     const double *from = planned->light->position;
     double linear[9], translation[3], turned[9], moved[3], frame[9];
     pt_light_frame(planned->light->direction, planned->light->side, frame);

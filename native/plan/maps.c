@@ -265,11 +265,11 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
     tests.view = &view;
     tests.group = group;
     struct pt_builder builder = {.scene = &view, .plan = map, .behind = round->layer > 0, .as = "light map"};
-    struct pt_instance *instances =
-        pt_arena_take(&map->arena, ((size_t)scene->cloud_count + scene->mesh_count + 1) * sizeof *instances);
+    struct pt_instance *instances = pt_arena_take(&map->arena,
+                                                  ((size_t)scene->cloud_count + scene->mesh_count + 1) * sizeof *instances);
     int error = instances ? PATINA_OK : PATINA_ERROR_MEMORY;
-    if (error || !pt_light_scene(scene, &picture->lights[round->light], group, round->sample, round->face, instances, &view,
-                                 window))
+    if (error ||
+        !pt_light_scene(scene, &picture->lights[round->light], group, round->sample, round->face, instances, &view, window))
         return error;
     pt_handle_init(&view.handle);
     if (group->soft) {

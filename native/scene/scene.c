@@ -220,7 +220,8 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     int error = pt_take(&scene->handle, "patina_scene_add_cloud", style, &checked, sizeof checked);
     if (error || (error = check_style(scene, &checked, cloud)) || (error = too_many(scene, cloud->slots, cloud->info.count)))
         return error;
-    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room, sizeof *scene->instances);
+    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room,
+                       sizeof *scene->instances);
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for instance %u", scene->cloud_count);
     scene->instances = grown;
@@ -268,7 +269,8 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
     error = too_many(scene, mesh->info.triangle_count, mesh->info.triangle_count);
     if (error)
         return error;
-    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room, sizeof *scene->instances);
+    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room,
+                       sizeof *scene->instances);
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for mesh %u", scene->mesh_count);
     scene->instances = grown;

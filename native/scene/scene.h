@@ -19,7 +19,7 @@ struct pt_instance {
         const struct patina_cloud *cloud;
         const struct patina_mesh *mesh;
     };
-    union { // defaults made explicit
+    union {                       // defaults made explicit
         patina_cloud_style style; // its ramp is the scene's
         patina_mesh_style mesh_style;
     };
