@@ -352,7 +352,7 @@ static void plan_fog(struct pt_builder *builder, enum pt_plane color)
 
 // ---- depth of field ------------------------------------------------------------------------------------------------------
 
-static int focuses(const struct patina_scene *scene) { return scene->effects.focus_aperture > 0.0f; }
+int pt_effects_focus(const struct patina_scene *scene) { return scene->effects.focus_aperture > 0.0f; }
 
 // Radius in pixels of the circle of confusion of what is infinitely far, in orthographic views of a world unit out of focus.
 static double focus_scale(const struct patina_scene *scene)
@@ -370,12 +370,12 @@ static double focus_most(const struct patina_scene *scene)
     return fmin(scale * fmax(fabs(1.0 - distance / camera->near_clip), 1.0), PT_FOCUS_MOST);
 }
 
-int pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct compose_args *compose)
+void pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct compose_args *compose)
 {
     const struct patina_scene *scene = builder->scene;
-    if (!focuses(scene)) {
+    if (!pt_effects_focus(scene)) {
         pt_skip(builder, "focus", "all is in focus");
-        return 0;
+        return;
     }
     double most = focus_most(scene), distance = (double)scene->effects.focus_distance;
     struct focus_args args = {.view = compose->view,
@@ -393,7 +393,6 @@ int pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct 
         PT_ADD(builder, focus, args, {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
         "depth of field, sharp at %.4g, circles of at most %.1f pixels", distance, most);
     pt_skip(builder, "compose", "depth of field does it");
-    return 1;
 }
 
 // ---- paper ---------------------------------------------------------------------------------------------------------------
@@ -451,7 +450,7 @@ uint32_t pt_effects_reach(const struct patina_scene *scene)
         reach += PT_REACH_obscure;
     if (follows_values(scene))
         reach += PT_REACH_slope;
-    if (focuses(scene))
+    if (pt_effects_focus(scene))
         reach += PT_REACH_focus;
     return reach;
 }

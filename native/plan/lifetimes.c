@@ -38,7 +38,8 @@ static void use_passes(struct builder_of_lives *b, uint32_t first, uint32_t coun
         for (uint32_t k = 0; k < b->plan->passes[i].ref_count; k++) {
             const struct pt_ref *ref = &b->plan->passes[i].refs[k];
             const int known = ref->of == PT_OF_FRAME && b->of[ref->which][ref->index] != NO_LIFE;
-            if (ref->of == PT_OF_FRAME && (!as_one || known || pt_plane_rows[ref->which].carried))
+            const int left = ref->which + 1 == b->plan->passes[first].leaves;
+            if (ref->of == PT_OF_FRAME && (!as_one || known || left || pt_plane_rows[ref->which].carried))
                 use(b, ref->which, ref->index);
         }
     }

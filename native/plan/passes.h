@@ -148,8 +148,9 @@ void pt_plan_values(struct pt_builder *builder);
 void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color);
 // On the smoothed colour, in place.
 void pt_plan_drawn_effects(struct pt_builder *builder, enum pt_plane color);
-// In place of composing; 0: composing is still to be planned.
-int pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct compose_args *compose);
+// Whether the picture has depth of field; and it, in place of composing.
+int pt_effects_focus(const struct patina_scene *scene);
+void pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct compose_args *compose);
 // On the picture.
 void pt_plan_paper(struct pt_builder *builder);
 

@@ -181,21 +181,9 @@ static void set_background(const patina_settings *settings, float background[4])
     background[3] = settings->film_transparent ? 0.0f : 1.0f;
 }
 
-static void plan_output(struct pt_builder *builder, enum pt_plane color)
+static void plan_extract(struct pt_builder *builder)
 {
-    const patina_settings *settings = &builder->scene->settings;
-    struct compose_args compose = compose_args(builder->plan);
-    set_background(settings, compose.background);
-    compose.everywhere = builder->plan->layers > 1 && builder->plan->line_radius > 0.0f;
-    if (!pt_plan_focus(builder, color, &compose))
-        PT_REASON(PT_ADD(builder, compose, compose,
-                         {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
-                  "%s",
-                  settings->film_transparent ? "transparent film"
-                  : settings->own_background ? "over its own background"
-                                             : "over the world colour");
-
-    struct extract_args extract = extract_args(builder, settings->passes);
+    struct extract_args extract = extract_args(builder, builder->scene->settings.passes);
     extract.centered = pt_tells_surfaces(builder) ? (uint32_t)builder->scene->points : 0;
     if (!extract.depth && !extract.normal && !extract.source && !extract.shadow) {
         pt_skip(builder, "extract", "no pass beside the combined one is asked for");
@@ -211,6 +199,27 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
                 pt_plane_if(extract.centered != 0, PT_PLANE_OFFSET, 0)}),
         "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "", extract.source ? " source" : "",
         extract.shadow ? " shadow" : "");
+}
+
+static void plan_output(struct pt_builder *builder, enum pt_plane color)
+{
+    const patina_settings *settings = &builder->scene->settings;
+    struct compose_args compose = compose_args(builder->plan);
+    set_background(settings, compose.background);
+    compose.everywhere = builder->plan->layers > 1 && builder->plan->line_radius > 0.0f;
+    const int focuses = pt_effects_focus(builder->scene);
+    if (focuses) // before depth of field: with what gives it colours, passes may run as one
+        plan_extract(builder);
+    pt_plan_focus(builder, color, &compose);
+    if (focuses)
+        return;
+    PT_REASON(PT_ADD(builder, compose, compose,
+                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
+              "%s",
+              settings->film_transparent ? "transparent film"
+              : settings->own_background ? "over its own background"
+                                         : "over the world colour");
+    plan_extract(builder);
 }
 
 // Why no light casts a shadow, or NULL.
@@ -417,17 +426,20 @@ static int reads_planes(enum pt_kernel kernel) { return kernel == PT_KERNEL_smoo
 
 static int gives_picture(enum pt_kernel kernel) { return kernel == PT_KERNEL_compose || kernel == PT_KERNEL_peel; }
 
-static int runs_with_others(enum pt_kernel kernel) { return pt_kernels[kernel].stage == PT_STAGE_colors || pointwise(kernel); }
+static int runs_with_others(enum pt_kernel kernel)
+{
+    return pt_kernels[kernel].stage == PT_STAGE_colors || pt_kernels[kernel].stage == PT_STAGE_effects || pointwise(kernel);
+}
 
-// From shading on, passes may run as one where nobody asks for what lies between them; or from behind the last of those that look
-// around in the colours, if smoothing or anti-aliasing follow.
+// From shading on, passes may run as one where nobody asks for what lies between them; or from behind the last of those that shading
+// does not follow at once, if smoothing or anti-aliasing follow. Up to the picture, or to depth of field, which looks around in the colours.
 static void put_together(const struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
     const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE |
                               1u << PATINA_PASS_SHADOW; // are taken from its planes, at the end
-    uint32_t first = builder->tail, end = first;
+    uint32_t first = builder->tail, end = first, leaves = 0;
     int picture = 0, reads = 0;
     if (settings->layer_passes || plan->triangles || (plan->layers == 1 && plan->transparent) ||
         (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
@@ -439,13 +451,18 @@ static void put_together(const struct pt_builder *builder)
             reads |= reads_planes(kernel);
         } else if (picture) {
             break;
+        } else if (kernel == PT_KERNEL_focus && reads) {
+            leaves = 1 + plan->passes[end].refs[PT_BUF_focus_color].which;
+            break;
         } else {
             first = end + 1;
             reads = 0;
         }
     }
-    if (picture && (first == builder->tail || reads))
+    if (leaves || (picture && (first == builder->tail || reads))) {
         plan->passes[first].together = end - first;
+        plan->passes[first].leaves = leaves;
+    }
 }
 
 // A layer with its passes and steps, of several or the only one.

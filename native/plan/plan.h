@@ -175,6 +175,7 @@ struct pt_pass {
     int output;        // writes the picture that readers see
     uint32_t when;     // pt_plan_share_planes: its place in time
     uint32_t together; // so many passes from this one on may run as one: nothing else reads the planes between them. 0: alone
+    uint32_t leaves;   // but 1 + this plane, of colours, which they leave to what follows; 0: they write the picture, or peel
 };
 
 struct pt_skipped {

@@ -65,13 +65,17 @@ static int run_pass(struct pt_execution *e, uint32_t i)
     return error;
 }
 
-// Planes that lie between passes that run as one are neither made nor written. Those that go from layer to layer are.
-static int is_made(const struct pt_ref *ref) { return ref->of != PT_OF_FRAME || pt_plane_rows[ref->which].carried; }
+// Planes that lie between passes that run as one are neither made nor written. Those that go from layer to layer are, and what `first`
+// says that they leave.
+static int is_made(const struct pt_pass *first, const struct pt_ref *ref)
+{
+    return ref->of != PT_OF_FRAME || pt_plane_rows[ref->which].carried || ref->which + 1 == first->leaves;
+}
 
-static int bind_between(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
+static int bind_between(struct pt_binder *binder, const struct pt_pass *first, const struct pt_ref *ref, struct pt_buffer **out)
 {
     const struct pt_ref as_it_is = {PT_OF_LEFT, ref->which, ref->index};
-    return pt_bind(binder, is_made(ref) ? ref : &as_it_is, out);
+    return pt_bind(binder, is_made(first, ref) ? ref : &as_it_is, out);
 }
 
 uint32_t pt_passes_together(const void *of, const struct pt_pass *passes)
@@ -101,7 +105,7 @@ static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
         bound[i] = (struct pt_bound_pass){passes[i].kernel, NULL, next, passes[i].ref_count, passes[i].argument_size};
         error = arguments_of(e, first + i, &bound[i].arguments);
         for (uint32_t k = 0; k < passes[i].ref_count && !error; k++)
-            error = bind_between(&e->binder, &passes[i].refs[k], next++);
+            error = bind_between(&e->binder, passes, &passes[i].refs[k], next++);
     }
     if (!error)
         error = e->device->ops->run_tail(e->device, bound, count);
@@ -170,7 +174,7 @@ static int bind_groups(struct pt_execution *e, uint32_t first, uint32_t end, str
             *bound = (struct pt_bound_pass){pass->kernel, NULL, buffers, pass->ref_count, pass->argument_size};
             error = arguments_of(e, k, &bound->arguments);
             for (uint32_t r = 0; r < pass->ref_count && !error; r++, buffers++)
-                error = taken > 1 ? bind_between(&e->binder, &pass->refs[r], buffers)
+                error = taken > 1 ? bind_between(&e->binder, &e->plan->passes[i], &pass->refs[r], buffers)
                                   : pt_bind(&e->binder, &pass->refs[r], buffers);
         }
     }

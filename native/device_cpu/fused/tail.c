@@ -1,11 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// tail: shade, smooth, antialias, then peel or compose and extract as one walk over rows, with the pointwise kernels that the plan
-// has between and behind them. The planes between them stay in rings of rows that the second-level cache holds: nothing but the
-// picture, or what peeling hands on, is written. Same functions, same numbers as the kernels. It begins with shading, or behind a
-// kernel that is none of these with the colours that this left.
+// tail: shade, obscure, edl, smooth, antialias, then peel or compose and extract as one walk over rows, with the pointwise kernels
+// that the plan has between and behind them. The planes between them stay in rings of rows that the second-level cache holds: nothing
+// but the picture, what peeling hands on, or the colours that depth of field looks around in is written. Same functions, same numbers
+// as the kernels. It begins with shading, or behind a kernel that is none of these with the colours that this left.
 // Where nothing is peeled the scene is opaque: alpha is 1 but for edges.
 #include "tail_shade.h"
 #include "device_cpu/pointwise/bodies.h"
+
+static uint32_t edl_rows(const struct tail *tail) { return tail->edl ? 2 * tail->edl->reach + 1 : 0; }
+
+static size_t thread_floats(const struct tail *tail)
+{
+    const uint32_t rows = tail->ring_mask + 1;
+    return (tail->ring * CHANNELS_SEEN + rows * CHANNELS_COLOR + 4 + (tail->obscure ? rows : 0) + edl_rows(tail)) *
+           tail->stride;
+}
 
 static void lay_out(const struct tail *tail, uint32_t thread, struct walk *walk)
 {
@@ -13,7 +22,7 @@ static void lay_out(const struct tail *tail, uint32_t thread, struct walk *walk)
     const size_t s = tail->stride;
     for (uint32_t i = 0; i < tail->ring; i++, at += CHANNELS_SEEN * s)
         walk->seen[i] = (struct pt_seen_row){at, at + s, {at + 2 * s, at + 3 * s, at + 4 * s}, (uint8_t *)(at + 5 * s), 0, 0};
-    for (uint32_t i = 0; i < RING; i++, at += CHANNELS_COLOR * s) {
+    for (uint32_t i = 0; i <= tail->ring_mask; i++, at += CHANNELS_COLOR * s) {
         walk->shaded[i] = (struct pt_color_row){NULL, {at, at + s, at + 2 * s, at + 3 * s}};
         walk->smoothed[i] = (struct pt_color_row){NULL, {at + 4 * s, at + 5 * s, at + 6 * s, at + 7 * s}};
         for (uint32_t k = 0; k < 5; k++)
@@ -24,14 +33,19 @@ static void lay_out(const struct tail *tail, uint32_t thread, struct walk *walk)
     for (uint32_t k = 0; k < 3; k++)
         walk->blended[k] = at + k * s;
     walk->wide = (uint8_t *)(at + 3 * s);
+    at += 4 * s;
+    for (uint32_t i = 0; i <= tail->ring_mask && tail->obscure; i++, at += s)
+        walk->obscured[i] = at;
+    walk->edl = (struct pt_edl_ring){at - PT_ROW_PAD, s, edl_rows(tail)};
 }
 
 // ---- smoothing -------------------------------------------------------------------------------------------------------------
 
 static void smooth(const struct tail *tail, struct walk *walk, int32_t y)
 {
-    const struct pt_color_row *const rows[3] = {&walk->shaded[slot(y - 1)], &walk->shaded[slot(y)], &walk->shaded[slot(y + 1)]};
-    struct pt_color_row *out = &walk->smoothed[slot(y)];
+    const struct pt_color_row *const rows[3] = {&walk->shaded[slot(tail, y - 1)], &walk->shaded[slot(tail, y)],
+                                                &walk->shaded[slot(tail, y + 1)]};
+    struct pt_color_row *out = &walk->smoothed[slot(tail, y)];
     const struct pt_seen_row *seen = seen_row(tail, walk, y);
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     out->z = rows[1]->z;
@@ -63,8 +77,8 @@ static void draw(const struct tail *tail, struct walk *walk, int32_t y)
     if (tail->smooth)
         smooth(tail, walk, y);
     else
-        walk->smoothed[slot(y)] = walk->shaded[slot(y)];
-    take_steps(tail, walk, &tail->after, &walk->smoothed[slot(y)], y);
+        walk->smoothed[slot(tail, y)] = walk->shaded[slot(tail, y)];
+    take_steps(tail, walk, &tail->after, &walk->smoothed[slot(tail, y)], y);
 }
 
 // ---- the picture ----------------------------------------------------------------------------------------------------------
@@ -132,7 +146,7 @@ static void put_passes(const struct tail *tail, const struct walk *walk, vf z, v
         vf normal[3], world[3] = {vf_zero(), vf_zero(), vf_zero()};
         if (vm_bits(some)) {
             for (uint32_t k = 0; k < 3; k++)
-                normal[k] = vf_load(walk->shown[slot((int32_t)py)][k] + px);
+                normal[k] = vf_load(walk->shown[slot(tail, (int32_t)py)][k] + px);
             pt_world_normal(args->world_from_view, normal, some, world);
         }
         vf_put3(tail->normals + 3 * out, world, count);
@@ -150,7 +164,7 @@ static void put_passes(const struct tail *tail, const struct walk *walk, vf z, v
     if (args->shadow) {
         vf value = vf_set(1.0f);
         if ((tail->with_normals || tail->arrived) && vm_bits(some))
-            value = vf_select(some, vf_load(walk->shown[slot((int32_t)py)][4] + px), value);
+            value = vf_select(some, vf_load(walk->shown[slot(tail, (int32_t)py)][4] + px), value);
         vf_put(tail->shadow + out, value, count);
     }
 }
@@ -159,7 +173,8 @@ static void put_row(const struct tail *tail, struct walk *walk, int32_t y)
 {
     const struct compose_args *args = tail->compose;
     const struct pt_seen_row *seen = seen_row(tail, walk, y);
-    const struct around around = {{&walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)]}};
+    const struct around around = {
+        {&walk->smoothed[slot(tail, y - 1)], &walk->smoothed[slot(tail, y)], &walk->smoothed[slot(tail, y + 1)]}};
     const uint32_t row = (uint32_t)y - args->crop_y;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     float *combined = tail->combined + 4 * (size_t)row * args->crop_width;
@@ -197,7 +212,8 @@ static void put_row(const struct tail *tail, struct walk *walk, int32_t y)
 static void peel_row(const struct tail *tail, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(tail, walk, y);
-    const struct around around = {{&walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)]}};
+    const struct around around = {
+        {&walk->smoothed[slot(tail, y - 1)], &walk->smoothed[slot(tail, y)], &walk->smoothed[slot(tail, y + 1)]}};
     const uint32_t *rect = tail->peel->view.rect, first = rect[0] / PT_TILE, width = tail->planes.view->width;
     const uint32_t columns = (width + PT_TILE - 1) / PT_TILE, last = (rect[2] + PT_TILE - 1) / PT_TILE;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
@@ -215,12 +231,49 @@ static void peel_row(const struct tail *tail, struct walk *walk, int32_t y)
         }
         // keys of what was filled across a layer already taken stay: nothing reads them any more
         pt_peel_pixels(tail->peel, &tail->peeled, (size_t)y * width + x, lanes, some, z, color,
-                       vf_load(walk->shown[slot(y)][3] + x), vf_load(seen->limit + x), &walk->tiles[x / PT_TILE]);
+                       vf_load(walk->shown[slot(tail, y)][3] + x), vf_load(seen->limit + x), &walk->tiles[x / PT_TILE]);
     }
     if (y % PT_TILE != PT_TILE - 1 && y != tail->end - 1)
         return;
     for (uint32_t tx = first; tx < last; tx++)
         tail->tiles[(size_t)(y / PT_TILE) * columns + tx] = pt_tile_end(&walk->tiles[tx]);
+}
+
+// ---- or colours that are left to what follows -----------------------------------------------------------------------------
+
+// Of a row of the crop the passes beside the colour.
+static void extract_row(const struct tail *tail, struct walk *walk, const struct around *around, int32_t y)
+{
+    const struct extract_args *args = tail->extract;
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
+    for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
+        const uint32_t px = args->crop_x + x, count = pt_lanes_left(x, args->crop_width);
+        vf z = vf_load(seen->z + px), color[4] = {vf_zero(), vf_zero(), vf_zero(), vf_zero()};
+        vm some = vm_and(vm_first(count), vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)))), mixed = vm_of_bits(0);
+        if (args->source && tail->antialias && vm_bits(some) && !pt_flat(seen, px))
+            mixed = mix_edges(tail, around, seen->limit, px, (uint32_t)y, some, color);
+        put_passes(tail, walk, z, some, mixed, x, (uint32_t)y - args->crop_y, count);
+    }
+}
+
+static void leave_row(const struct tail *tail, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
+    const struct around around = {
+        {&walk->smoothed[slot(tail, y - 1)], &walk->smoothed[slot(tail, y)], &walk->smoothed[slot(tail, y + 1)]}};
+    float *out = tail->left + 4 * (size_t)y * tail->planes.view->width;
+    for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
+        vm some = vf_lt(vf_load(seen->z + x), vf_set(pt_float(PT_KEY_EMPTY_Z)));
+        vf color[4] = {vf_load(around.row[1]->color[0] + x), vf_load(around.row[1]->color[1] + x),
+                       vf_load(around.row[1]->color[2] + x), vf_set(1.0f)};
+        if (!vm_bits(some))
+            continue;
+        if (tail->antialias && !pt_flat(seen, x))
+            mix_edges(tail, &around, seen->limit, x, (uint32_t)y, some, color);
+        vf_store4(out + 4 * (size_t)x, color, vm_bits(some));
+    }
+    if (tail->extract && (uint32_t)y - tail->extract->crop_y < tail->extract->crop_height)
+        extract_row(tail, walk, &around, y);
 }
 
 // ---- the walk ----------------------------------------------------------------------------------------------------------------
@@ -229,55 +282,83 @@ static void tail_rows(void *context, uint32_t begin, uint32_t end, uint32_t thre
 {
     const struct tail *tail = context;
     struct walk *walk = &tail->walks[thread];
-    const int32_t reach = tail->reach, first = tail->base + (int32_t)(begin * UNIT);
+    const int32_t lag = tail->lag, ahead = lag + tail->reach, first = tail->base + (int32_t)(begin * UNIT);
     int32_t last = tail->base + (int32_t)(end * UNIT);
     last = last < tail->end ? last : tail->end;
     int32_t y = first;
     if (first != walk->next) { // not where this thread stopped: begin anew
         walk->first = first;
-        y = first - 4 - 2 * reach;
+        y = first - 4 - 2 * ahead;
     }
-    for (; y < last; y++) { // y is finished when y + 2 + reach has been seen
-        see(tail, walk, y + 2 + reach);
-        find_flat(tail, walk, y + 1 + reach);
-        if (y + 2 >= walk->first - 2)
-            shade(tail, walk, y + 2);
+    for (; y < last; y++) { // y is finished when y + 2 + ahead has been seen
+        see(tail, walk, y + 2 + ahead);
+        find_flat(tail, walk, y + 1 + ahead);
+        if (y + 2 + lag >= walk->first - 2 - lag)
+            shade(tail, walk, y + 2 + lag);
+        if (tail->obscure && y + 2 >= walk->first - 2)
+            obscure(tail, walk, y + 2);
         if (y + 1 >= walk->first - 1)
             draw(tail, walk, y + 1);
         if (y >= walk->first && tail->peel)
             peel_row(tail, walk, y);
-        else if (y >= walk->first)
+        else if (y >= walk->first && tail->compose)
             put_row(tail, walk, y);
+        else if (y >= walk->first)
+            leave_row(tail, walk, y);
     }
     walk->next = last;
 }
 
-// What a pointwise pass asks for.
-static void add_step(struct tail *tail, uint32_t i)
+// Puts a pass in its place. color: which of its buffers is the plane of colours.
+static void add_step(struct tail *tail, uint32_t i, uint32_t color)
 {
-    const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[tail->passes[i].kernel];
-    struct steps *steps = tail->compose || tail->peel ? &tail->last : tail->smooth ? &tail->after : &tail->before;
+    struct steps *steps = tail->compose || tail->peel ? &tail->last
+                          : tail->smooth              ? &tail->after
+                          : tail->obscure             ? &tail->darkened
+                                                      : &tail->before;
     if (!steps->count++)
         steps->first = i;
+    if (!tail->shade_count && !tail->colors && steps != &tail->last)
+        tail->colors = pt_cpu_data(&tail->passes[i].call, color);
+}
+
+// And notes what a pointwise one asks for.
+static void add_pointwise(struct tail *tail, uint32_t i)
+{
+    const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[tail->passes[i].kernel];
     tail->shows_normals |= kernel->shading >= 0;
     if (kernel->albedo >= 0)
         tail->albedo = tail->passes[i].call.buffers[kernel->albedo];
-    if (!tail->shade_count && !tail->colors && steps != &tail->last)
-        tail->colors = pt_cpu_data(&tail->passes[i].call, (uint32_t)kernel->color);
+    add_step(tail, i, (uint32_t)kernel->color);
 }
 
-// Where nothing is shaded: smoothing and anti-aliasing say what pixels show.
+// Smoothing and anti-aliasing say, where nothing is shaded, what pixels show; and where the walk goes.
 _Static_assert((int)PT_BUF_smooth_from == (int)PT_BUF_antialias_from && (int)PT_BUF_smooth_deff == (int)PT_BUF_antialias_deff &&
-                   (int)PT_BUF_smooth_color == (int)PT_BUF_antialias_color,
+                   (int)PT_BUF_smooth_color == (int)PT_BUF_antialias_color && !PT_BUF_smooth_keys && !PT_BUF_antialias_keys,
                "smooth and antialias list what they read alike");
-static void take_planes(struct tail *tail, const struct pt_cpu_call *call)
+static void take_planes(struct tail *tail, const struct pt_cpu_call *call, float *result)
 {
+    tail->planes.keys = PT_DATA(call, smooth, keys);
+    tail->planes.view = call->arguments;
+    tail->base = (int32_t)tail->planes.view->rect[1];
+    tail->end = (int32_t)tail->planes.view->rect[3];
+    tail->left = result;
     if (tail->shade_count)
         return;
     tail->planes.from = PT_DATA(call, smooth, from);
     tail->planes.deff = PT_DATA(call, smooth, deff);
     if (!tail->colors)
         tail->colors = PT_DATA(call, smooth, color);
+}
+
+// Where colours are left, passes are the crop's all the same.
+static void take_crop(struct tail *tail)
+{
+    const int32_t first = (int32_t)tail->extract->crop_y, end = first + (int32_t)tail->extract->crop_height;
+    if (tail->compose || tail->peel)
+        return;
+    tail->base = tail->base < first ? tail->base : first;
+    tail->end = tail->end > end ? tail->end : end;
 }
 
 int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
@@ -295,12 +376,24 @@ int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
             tail.planes.normals = PT_DATA(call, shade, normal);
             tail.planes.deff = PT_DATA(call, shade, deff);
             break;
+        case PT_KERNEL_obscure:
+            tail.obscure = call->arguments;
+            tail.shows_normals = 1;
+            if (!tail.shade_count) {
+                tail.shading = PT_DATA(call, obscure, shading);
+                tail.colors = tail.colors ? tail.colors : PT_DATA(call, obscure, color);
+            }
+            break;
+        case PT_KERNEL_edl:
+            tail.edl = call->arguments;
+            add_step(&tail, i, PT_BUF_edl_color);
+            break;
         case PT_KERNEL_smooth:
-            take_planes(&tail, call);
+            take_planes(&tail, call, PT_DATA(call, smooth, result));
             tail.smooth = call->arguments;
             break;
         case PT_KERNEL_antialias:
-            take_planes(&tail, call);
+            take_planes(&tail, call, PT_DATA(call, antialias, color));
             tail.antialias = call->arguments;
             tail.through = tail.antialias->behind ? PT_DATA(call, antialias, through) : NULL;
             tail.line = tail.antialias->inked ? PT_DATA(call, antialias, line) : NULL;
@@ -327,7 +420,7 @@ int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
         case PT_KERNEL_extract:
             tail.extract = call->arguments;
             tail.shows_normals |= (int)tail.extract->normal;
-            tail.shading = tail.extract->normal ? PT_DATA(call, extract, shading) : NULL;
+            tail.shading = tail.extract->normal ? PT_DATA(call, extract, shading) : tail.shading;
             tail.arrived = tail.extract->shadow ? PT_DATA(call, extract, arrived) : NULL;
             if (!tail.planes.from) // smoothing's, where nothing is shaded: extract has it for some passes alone
                 tail.planes.from = PT_DATA(call, extract, from);
@@ -337,8 +430,9 @@ int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
             tail.shadow = PT_DATA(call, extract, shadow);
             tail.away = PT_DATA(call, extract, away);
             tail.offsets = PT_DATA(call, extract, offset);
+            take_crop(&tail);
             break;
-        default: add_step(&tail, i);
+        default: add_pointwise(&tail, i);
         }
     }
     if (tail.shade_count) {
@@ -349,8 +443,11 @@ int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
     memcpy(tail.planes.rect, tail.planes.view->rect, sizeof tail.planes.rect);
     tail.channels = tail.peel ? 4 : 3;
     tail.stride = pt_row_stride(tail.planes.view->width);
-    tail.ring = (uint32_t)(2 * tail.reach > tail.reach + 3 ? 2 * tail.reach : tail.reach + 3) + 1;
-    tail.thread_floats = (tail.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR + 4) * tail.stride;
+    tail.lag = tail.obscure ? LAG : 0;
+    tail.ring_mask = tail.lag ? RING_MOST - 1 : RING - 1;
+    const int32_t ring = tail.reach + tail.lag + 3;
+    tail.ring = (uint32_t)(2 * tail.reach > ring ? 2 * tail.reach : ring) + 1;
+    tail.thread_floats = thread_floats(&tail);
     pt_blend_weights(tail.weights);
     uint32_t threads = pt_pool_threads(shared->pool);
     tail.memory = pt_cpu_scratch(shared, 0, threads * tail.thread_floats * sizeof(float));
@@ -362,7 +459,7 @@ int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
         return PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < threads; i++) {
         lay_out(&tail, i, &tail.walks[i]);
-        tail.walks[i].next = INT32_MIN;
+        tail.walks[i].next = tail.walks[i].edl_next = INT32_MIN;
         tail.walks[i].tiles = (struct pt_tile_sum *)(void *)((char *)tail.walks + walks) + i * columns;
     }
     if (tail.end > tail.base)

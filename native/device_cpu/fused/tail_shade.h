@@ -82,7 +82,7 @@ static inline __attribute__((always_inline)) void light_row(const struct tail *t
     const struct shade_args *args = call->arguments;
     const uint32_t *shadows = PT_DATA(call, shade, shadows);
     const struct view_args *view = tail->planes.view;
-    const struct pt_color_row *out = &walk->shaded[slot(y)];
+    const struct pt_color_row *out = &walk->shaded[slot(tail, y)];
     const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
     const int reach = (int)args->blend;
     for (int32_t k = -reach; k <= reach; k++)
@@ -101,9 +101,9 @@ static inline __attribute__((always_inline)) void light_row(const struct tail *t
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(out->color[k] + x, color[k], ours);
         for (uint32_t k = 0; k < 3 && tail->shows_normals; k++)
-            vf_store_where(walk->shown[slot(y)][k] + x, normal[k], ours);
+            vf_store_where(walk->shown[slot(tail, y)][k] + x, normal[k], ours);
         if (tail->extract && tail->extract->shadow)
-            vf_store_where(walk->shown[slot(y)][4] + x, share, ours);
+            vf_store_where(walk->shown[slot(tail, y)][4] + x, share, ours);
     }
 }
 
@@ -220,19 +220,19 @@ static void blend_wide(const struct tail *tail, struct walk *walk, int32_t y)
 static void fetch_albedo(const struct tail *tail, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(tail, walk, y);
-    float *const *rows = walk->albedo[slot(y)];
-    const struct pt_color_row out = {seen->z, {rows[0], rows[1], rows[2], walk->shaded[slot(y)].color[3]}};
+    float *const *rows = walk->albedo[slot(tail, y)];
+    const struct pt_color_row out = {seen->z, {rows[0], rows[1], rows[2], walk->shaded[slot(tail, y)].color[3]}};
     fetch(tail, call, seen, &out, y);
     if (tail->channels == 4)
-        make_translucent(tail, call, seen, &out, walk->shown[slot(y)][3], y);
+        make_translucent(tail, call, seen, &out, walk->shown[slot(tail, y)][3], y);
 }
 
 // Of a picture that was shaded before: what others left in planes.
 static void load_shaded(const struct tail *tail, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(tail, walk, y);
-    const struct pt_color_row *out = &walk->shaded[slot(y)];
-    float *const *shown = walk->shown[slot(y)];
+    const struct pt_color_row *out = &walk->shaded[slot(tail, y)];
+    float *const *shown = walk->shown[slot(tail, y)];
     for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
         const size_t at = (size_t)y * tail->planes.view->width + x;
         vf four[4];
@@ -249,6 +249,29 @@ static void load_shaded(const struct tail *tail, struct walk *walk, int32_t y)
     }
 }
 
+// Eye-dome lighting: rows of its ring follow those of the walk, which goes on, leaves out rows or begins anew.
+static void darken(const struct tail *tail, struct walk *walk, const struct pt_color_row *colors, int32_t y)
+{
+    const struct edl_args *args = tail->edl;
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
+    const struct pt_edl_ring *ring = &walk->edl;
+    const int32_t reach = (int32_t)args->reach, end = y + reach + 1;
+    const float *near[PT_EDL_NEIGHBOURS], *own = pt_edl_row(ring, y);
+    if (walk->edl_next < y - reach || walk->edl_next > end)
+        walk->edl_next = y - reach;
+    for (; walk->edl_next < end; walk->edl_next++)
+        pt_edl_load_row(&args->view, tail->planes.keys, walk->edl_next, pt_edl_row(ring, walk->edl_next));
+    pt_edl_near(args, ring, y, near);
+    for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
+        vf depth = vf_load(own + x);
+        if (!vm_bits(vf_lt(vf_set(PT_EDL_EMPTY), depth)))
+            continue;
+        vf light = pt_edl_light(args, near, depth, x);
+        for (int k = 0; k < 3; k++) // what is empty may become anything
+            vf_store(colors->color[k] + x, vf_load(colors->color[k] + x) * light);
+    }
+}
+
 // Steps on a row of colours.
 static void take_steps(const struct tail *tail, struct walk *walk, const struct steps *steps, const struct pt_color_row *colors,
                        int32_t y)
@@ -257,6 +280,10 @@ static void take_steps(const struct tail *tail, struct walk *walk, const struct 
     for (uint32_t i = steps->first; i < steps->first + steps->count && seen->end; i++) {
         const struct pt_cpu_call *call = &tail->passes[i].call;
         const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[tail->passes[i].kernel];
+        if (tail->passes[i].kernel == PT_KERNEL_edl) {
+            darken(tail, walk, colors, y);
+            continue;
+        }
         const size_t at = (size_t)y * tail->planes.view->width;
         struct pt_walk_row row = {.args = call->arguments,
                                   .clips = kernel->clips < 0 ? NULL : pt_cpu_data(call, (uint32_t)kernel->clips),
@@ -271,8 +298,8 @@ static void take_steps(const struct tail *tail, struct walk *walk, const struct 
         if (kernel->albedo >= 0 && !tail->shade_count)
             row.albedo = (const float *)pt_cpu_data(call, (uint32_t)kernel->albedo) + 4 * at;
         for (uint32_t k = 0; k < 3; k++) {
-            row.normal_rows[k] = walk->shown[slot(y)][k];
-            row.albedo_rows[k] = walk->albedo[slot(y)][k];
+            row.normal_rows[k] = walk->shown[slot(tail, y)][k];
+            row.albedo_rows[k] = walk->albedo[slot(tail, y)][k];
             row.color_rows[k] = colors->color[k];
         }
         row.color_rows[3] = tail->channels == 4 ? colors->color[3] : NULL;
@@ -280,10 +307,45 @@ static void take_steps(const struct tail *tail, struct walk *walk, const struct 
     }
 }
 
+// How much of each pixel is obscured, before the mean.
+static void find_obscured(const struct tail *tail, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
+    float *const *shown = walk->shown[slot(tail, y)], *out = walk->obscured[slot(tail, y)];
+    for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
+        vf z = vf_load(seen->z + x);
+        vm some = vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
+        const vf normal[3] = {vf_load(shown[0] + x), vf_load(shown[1] + x), vf_load(shown[2] + x)};
+        if (vm_bits(some))
+            vf_store(out + x, pt_obscured(tail->obscure, tail->planes.keys, z, normal, x, (uint32_t)y, some));
+    }
+}
+
+// The mean of that, when the two rows before y and behind it are known; and the steps that follow.
+static void obscure(const struct tail *tail, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *seen = seen_row(tail, walk, y);
+    const struct pt_color_row *colors = &walk->shaded[slot(tail, y)];
+    const float *z[PT_OBSCURE_ROWS], *obscured[PT_OBSCURE_ROWS];
+    for (int32_t k = 0; k < PT_OBSCURE_ROWS; k++) {
+        z[k] = seen_row(tail, walk, y + k - PT_OBSCURE_BLUR)->z;
+        obscured[k] = walk->obscured[slot(tail, y + k - PT_OBSCURE_BLUR)];
+    }
+    for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
+        vm some = vf_lt(vf_load(seen->z + x), vf_set(pt_float(PT_KEY_EMPTY_Z)));
+        if (!vm_bits(some))
+            continue;
+        vf light = pt_obscure_light(tail->obscure, z, obscured, vf_load(seen->limit + x), x, some);
+        for (int k = 0; k < 3; k++)
+            vf_store(colors->color[k] + x, vf_load(colors->color[k] + x) * light);
+    }
+    take_steps(tail, walk, &tail->darkened, colors, y);
+}
+
 static void shade(const struct tail *tail, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(tail, walk, y);
-    struct pt_color_row *out = &walk->shaded[slot(y)];
+    struct pt_color_row *out = &walk->shaded[slot(tail, y)];
     out->z = seen->z;
     if (tail->with_normals && tail->reach == 1 && seen->end)
         blend_nine(tail, walk, y);
@@ -299,11 +361,13 @@ static void shade(const struct tail *tail, struct walk *walk, int32_t y)
         if (tail->with_normals)
             shade_lit(tail, walk, call, y);
         if (tail->channels == 4)
-            make_translucent(tail, call, seen, out, walk->shown[slot(y)][3], y);
+            make_translucent(tail, call, seen, out, walk->shown[slot(tail, y)][3], y);
     }
     if (tail->colors && seen->end)
         load_shaded(tail, walk, y);
     take_steps(tail, walk, &tail->before, out, y);
+    if (tail->obscure)
+        find_obscured(tail, walk, y);
 }
 
 #endif
