@@ -593,6 +593,33 @@ static void test_lines_are_planned_where_asked_for(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// Cues that look around in keys run with shading as one; depth of field behind them, in the colours that these leave.
+static void test_cues_run_as_one(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
+    patina_effects effects = {.struct_size = sizeof effects, .edl_strength = 1, .obscurance_strength = 1};
+    for (int focused = 0; focused < 2; focused++) {
+        effects.focus_distance = 2.0f;
+        effects.focus_aperture = focused ? 0.1f : 0.0f;
+        assert_int_equal(patina_scene_set_effects(scene, &effects), PATINA_OK);
+        struct pt_plan plan = plan_of(scene);
+        uint32_t first = 0;
+        while (first < plan.pass_count - 1 && !plan.passes[first].together)
+            first++;
+        const struct pt_pass *pass = &plan.passes[first];
+        assert_int_equal(pass->kernel, PT_KERNEL_shade);
+        assert_int_equal(first + pass->together, plan.pass_count - (uint32_t)focused);
+        assert_int_equal(pass->leaves, focused ? 1 + PT_PLANE_COLOR_B : 0);
+        if (focused)
+            assert_int_equal(plan.passes[plan.pass_count - 1].kernel, PT_KERNEL_focus);
+        pt_plan_destroy(&plan);
+    }
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 // What a pass may bind, kernels.def says: anything else fails the plan.
 static void test_passes_bind_what_their_kernels_list(void **state)
 {
@@ -736,6 +763,7 @@ int main(void)
         cmocka_unit_test(test_no_camera_is_an_error),
         cmocka_unit_test(test_normals_are_blended_where_they_show),
         cmocka_unit_test(test_layers),
+        cmocka_unit_test(test_cues_run_as_one),
         cmocka_unit_test(test_passes_bind_what_their_kernels_list),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -65,8 +65,8 @@ static inline vf pt_obscure_tap(const struct obscure_args *args, const uint64_t 
 }
 
 // How much of PT_LANES pixels from (x, y) on is obscured, before the mean. shown: the normals; keys: of the plane.
-static inline vf pt_obscured(const struct obscure_args *args, const uint64_t *keys, vf z, const vf shown[3], uint32_t x, uint32_t y,
-                             vm some)
+static inline vf pt_obscured(const struct obscure_args *args, const uint64_t *keys, vf z, const vf shown[3], uint32_t x,
+                             uint32_t y, vm some)
 {
     struct pt_obscure_point p = {.z = z};
     vf sum = vf_zero();
