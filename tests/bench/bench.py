@@ -40,6 +40,7 @@ from typing import Any
 
 import analysis
 import case as cases
+import cues
 import files
 import imports
 import instructions
@@ -102,7 +103,6 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
         found += [case_of("inside", device=main, points=count, frames=n, distance=1.2, bare=bare,
                           scene="torus from inside" + ", without normals" * bare)
                   for count in (1_000_000, 100_000) for bare in (0, 1)]
-    found += [case_of("cues", device=main, points=1_000_000, mode=mode, frames=n) for mode in ("surface", *cases.CUES)]
     found += [case_of("lines", device=main, points=1_000_000, mode=mode, frames=n, scene=f"torus, {mode}")
               for mode in ("surface", "lines 2", "lines 8", "lines 16")]
     counts = [100_000] if quick else [10_000, 100_000, 10_000_000] + [100_000_000] * full
@@ -213,6 +213,7 @@ def hard_cases(options: argparse.Namespace) -> str:
 # What stands on the page beside the rows: group, title, and what measures it, as Markdown.
 PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
     "hard": ("hard", "Hard cases", hard_cases),
+    "cues": ("cues", "Depth cues and means of drawing on the torus", lambda options: cues.text(options.quick, options.library, options.device[0])),
     "holes": ("tests", "Holes against density", lambda options: quoted.holes(options.library)),
     "outlines": ("tests", "Outlines", lambda options: quoted.outlines(options.library)),
     "slopes": ("tests", "Slopes", lambda options: quoted.slopes(options.library)),

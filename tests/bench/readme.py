@@ -147,17 +147,6 @@ def lines(result: dict[str, Any]) -> str:
             f"lines of 2, 8 and 16 pixels.")
 
 
-def cues(result: dict[str, Any]) -> str:
-    """What each depth cue or means of drawing adds to the headline's picture, whole and in its own pass."""
-    rows = joined(result, "cues")
-    plain = next(row for row in rows if row["mode"] == "surface")["ms_median"]
-    kernels = {"eye-dome lighting": "edl", "ambient obscurance": "obscure", "toon bands": "toon", "hatching": "hatch",
-               "fog": "fog", "depth of field": "focus", "paper": "paper"}
-    body = [[row["mode"], f"{row['passes'][kernels[row['mode']]]:.2f}", f"{row['ms_median'] - plain:.1f}"]
-            for row in rows if row["mode"] in kernels]
-    return table(["what", "its pass, ms", "picture, ms more"], body)
-
-
 def styles(result: dict[str, Any]) -> str:
     """Every style's time on the headline's cloud, and as a multiple of the plain one's."""
     rows = joined(result, "styles")
@@ -239,7 +228,7 @@ def update(result: dict[str, Any], root: Path) -> str:
             parts |= {"others": others(result), "short": short(result)}
         if any(row["device"].startswith("VTK") for row in joined(result, "effects")):
             parts["effects"] = effects(result)
-    for name, part in (("discs", discs), ("lines", lines), ("inside", inside), ("cues", cues), ("styles", styles),
+    for name, part in (("discs", discs), ("lines", lines), ("inside", inside), ("styles", styles),
                        ("independent", independent)):
         if joined(result, name):
             parts[name] = part(result)

@@ -103,7 +103,6 @@ def markdown(result: dict[str, Any]) -> str:
                  *notes(joined(result, "peers")), ""]
     for group, title in (("levels", "Processors that have less"), ("discs", "Filling or discs"),
                          ("inside", "Among the points"), ("effects", "Layers and shadows of the torus"),
-                         ("cues", "Depth cues and means of drawing on the torus, one by one"),
                          ("lines", "Lines around the torus"),
                          ("styles", "Styles, one row each"),
                          ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
