@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Building a cloud: how long it takes, progress that only grows, cancel that works soon, input in every type.
+#include "base/platform.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 
@@ -47,8 +48,8 @@ static void test_time(void **state)
     }
     qsort(seconds, 7, sizeof *seconds, ascending);
     qsort(work, 7, sizeof *work, ascending);
-    printf("  1000000 random points with normals and colours: %.3f s (%.3f to %.3f) on %ld processors, %.3f s of work\n",
-           seconds[3], seconds[0], seconds[6], sysconf(_SC_NPROCESSORS_ONLN), work[3]);
+    printf("  1000000 random points with normals and colours: %.3f s (%.3f to %.3f) on %u processors, %.3f s of work\n",
+           seconds[3], seconds[0], seconds[6], pt_core_count(), work[3]);
     points_free(&points);
 }
 
