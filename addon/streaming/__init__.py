@@ -2,7 +2,7 @@
 """COPC and EPT without conversion: clouds whose pages are read as pictures want them. reader.py reads, in a process of its own; here its pages are
 looked for and handed to the library, without waiting. Knows no Blender.
 
-copc.py, ept.py, source.py, kept.py and reader.py are that process's and import nothing of the add-on's.
+address.py, copc.py, ept.py, source.py, kept.py and reader.py are that process's and import nothing of the add-on's.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ from dataclasses import dataclass, field
 
 import copc
 import numpy as np
-from source import MOST_BYTES, Source, SourceError, last_of
+from address import last_of
+from source import MOST_BYTES, Source, SourceError
 
 ENDINGS = {"laszip": "laz", "binary": "bin"}
 MOST_TEXT = 1 << 28  # bytes of a file of JSON

@@ -19,8 +19,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import copc  # noqa: E402
 import ept  # noqa: E402
+from address import is_ept  # noqa: E402
 from kept import kept  # noqa: E402
-from source import SourceError, is_ept, source_of  # noqa: E402
+from source import SourceError, source_of  # noqa: E402
 
 MOST_FAILURES = 3  # pages in a row that cannot be fetched: then nothing else is tried until somebody asks again
 MOST_WAITING = 64  # pages that lie there until Blender takes them

@@ -15,6 +15,8 @@ import urllib.parse
 import urllib.request
 from dataclasses import dataclass
 
+from address import is_address, is_ept, last_of
+
 TIMEOUT = 20.0  # seconds without a byte
 TRIES = 3
 WAIT = 0.5  # seconds before the second one, twice as long before each further one
@@ -248,20 +250,6 @@ def _sentence(error: Exception) -> str:
     if isinstance(reason, ConnectionError) or isinstance(error, http.client.HTTPException):
         return f"the connection broke off ({type(reason).__name__})"
     return str(getattr(reason, "strerror", None) or reason)
-
-
-def is_address(place: str) -> bool:
-    return place.lower().startswith(("http://", "https://"))
-
-
-def last_of(place: str) -> str:
-    """The name of what a path or an address names, without its folder."""
-    return (urllib.parse.urlsplit(place).path if is_address(place) else place.replace(os.sep, "/")).rpartition("/")[2]
-
-
-def is_ept(place: str) -> bool:
-    """Whether it tells of a folder of Entwine point tiles."""
-    return last_of(place).lower() == "ept.json"
 
 
 def source_of(place: str, timeout: float = TIMEOUT, wait: float = WAIT, offline: str = "") -> Source:

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from .. import native, preferences
-from ..streaming.source import is_address, is_ept
+from ..streaming.address import is_address, is_ept
 
 LARGE = 20_000_000  # points: from here on a COPC is read as it is wanted, where nobody chose
 

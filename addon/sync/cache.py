@@ -11,7 +11,7 @@ import bpy
 
 from .. import preferences, streaming
 from ..streaming import shelf
-from ..streaming.source import is_address
+from ..streaming.address import is_address
 from . import kept
 
 _KEPT = ("*.cloud", "*.json", "*.scan", "*-packed.*")
