@@ -18,6 +18,7 @@ enum {
     BLOCK_MOST = 1 << 18
 };
 enum { COLOR = 2 }; // the field
+enum { ALL_FIELDS = (1 << PT_BUILDER_FIELDS) - 1 };
 enum { ABOVE_BYTE = 1, LOW_BYTE = 2, UNLIKE = 4 };
 
 // Cells of a level's grid are 2^bits a side.
@@ -225,11 +226,20 @@ static void look_at_color(struct patina_builder *builder, const char *color, uns
     (void)builder;
 }
 
+// Of the fields whose bits are unset, those of which the record has a byte that is not zero.
+static unsigned look_for_values(const struct patina_builder *builder, const char *record, unsigned nonzero)
+{
+    for (int k = 0; k < PT_BUILDER_FIELDS; k++)
+        for (uint32_t j = 0; j < builder->size[k] && !(nonzero & 1u << k); j++)
+            nonzero |= record[builder->offset[k] + j] ? 1u << k : 0;
+    return nonzero;
+}
+
 static void assemble(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct batch *batch = context;
     struct patina_builder *builder = batch->builder;
-    unsigned seen = 0;
+    unsigned seen = 0, nonzero = atomic_load(&builder->nonzero);
     uint64_t invalid = 0;
     (void)thread;
     for (uint32_t i = begin * SHARE; i < end * SHARE && i < batch->count; i++) {
@@ -248,7 +258,10 @@ static void assemble(void *context, uint32_t begin, uint32_t end, uint32_t threa
         memcpy(record + builder->number, &number, sizeof number);
         if (builder->desc.narrow_colors && builder->size[COLOR] == 6)
             look_at_color(builder, record + builder->offset[COLOR], &seen);
+        if (nonzero != ALL_FIELDS)
+            nonzero = look_for_values(builder, record, nonzero);
     }
+    atomic_fetch_or(&builder->nonzero, nonzero);
     atomic_fetch_or(&builder->wide_colors, seen);
     atomic_fetch_add(&batch->invalid, invalid);
 }

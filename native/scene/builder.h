@@ -33,6 +33,7 @@ struct patina_builder {
     double box_min[3], box_max[3];
     uint64_t count, drawn, invalid_positions;
     atomic_uint wide_colors; // bits: some is above 255, some has a low byte, some a low byte unlike its high one
+    atomic_uint nonzero;     // bits: fields of which some point has a byte that is not zero
     char *records;           // of the batch at hand
     double (*places)[3];
     uint16_t *targets; // buckets

@@ -423,6 +423,15 @@ static int write_file(struct finish *finish)
 
 // ---- end -----------------------------------------------------------------------------------------------------------------
 
+// Normals, colours, scalars and classes: their bytes stay in the records, which nobody looks at then.
+static void leave_out_zeros(struct patina_builder *builder)
+{
+    static const int may[] = {1, 2, 5, 6};
+    const unsigned nonzero = atomic_load(&builder->nonzero);
+    for (size_t i = 0; i < sizeof may / sizeof may[0]; i++)
+        builder->size[may[i]] = nonzero & 1u << may[i] ? builder->size[may[i]] : 0;
+}
+
 static int end_build(struct finish *finish)
 {
     struct patina_builder *builder = finish->builder;
@@ -432,6 +441,8 @@ static int end_build(struct finish *finish)
     for (int i = 0; i < PT_BUILDER_BUCKETS; i++)
         if (pt_tape_rest(&builder->spill, &builder->buckets[i].tape))
             return pt_builder_fail(builder, builder->spill.error);
+    if (builder->desc.narrow_colors)
+        leave_out_zeros(builder);
     patina_cloud_desc desc;
     const int narrow = narrow_shift(builder) >= 0;
     pt_builder_view(builder, "", builder->count, &desc);

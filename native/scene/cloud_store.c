@@ -273,6 +273,7 @@ static int read_header(const char *path, const struct pt_disk *disk, struct pati
     cloud->chunk_count = header->chunk_count;
     cloud->color_format = header->color_format;
     cloud->spacing_base = header->spacing_base;
+    cloud->built = header->built;
     cloud->class_hash = header->class_hash;
     cloud->sights = (struct pt_sights){
         .count = (uint32_t)header->sight_count, .room = (uint32_t)header->sight_room, .bytes = header->sight_bytes};

@@ -190,6 +190,28 @@ static void test_same_bytes(void **state)
     }
 }
 
+// Opening forgets nothing that a file says: the size in memory aside, the head of a cloud that is opened and saved again is the same.
+static void test_opened_and_saved(void **state)
+{
+    (void)state;
+    enum { BYTES_AT = 128, SUM_AT = 504 }; // in the head
+    struct columns all = columns_of(FEW, 0.0);
+    patina_cloud *cloud = NULL;
+    size_t size, other_size;
+    CHECK(build(at("built"), &all.desc, NULL, FEW), NULL);
+    CHECK(patina_cloud_open(at("built"), &cloud), NULL);
+    CHECK(patina_cloud_save(cloud, at("again")), cloud);
+    patina_cloud_destroy(cloud);
+    char *data = bytes_of(at("built"), &size), *again = bytes_of(at("again"), &other_size);
+    assert_int_equal(size, other_size);
+    for (size_t i = 0; i < size; i++)
+        if (data[i] != again[i] && i / 8 != BYTES_AT / 8 && i / 8 != SUM_AT / 8)
+            support_die("byte %zu of %zu differs", i, size);
+    free(data);
+    free(again);
+    columns_free(&all);
+}
+
 static void test_narrow_colors(void **state)
 {
     (void)state;
@@ -207,6 +229,44 @@ static void test_narrow_colors(void **state)
         assert_same_file(at("built"), at("wanted"));
     }
     free(wide);
+    columns_free(&all);
+}
+
+// What is zero everywhere is as if it were not there; one value that is not, in the last piece, and it stays.
+static void test_dropped_zeros(void **state)
+{
+    (void)state;
+    struct columns all = columns_of(FEW, 0.0);
+    const patina_builder_desc how = {.struct_size = sizeof how, .memory = 1 << 28, .narrow_colors = 1};
+    float *normal = calloc(FEW * 3, sizeof *normal), *scalar = calloc(FEW, sizeof *scalar);
+    uint16_t *color = calloc(FEW * 3, sizeof *color);
+    uint8_t *classes = calloc(FEW, 1);
+    patina_cloud_desc zeros = all.desc, none = all.desc;
+    zeros.normal.data = normal;
+    zeros.color = (patina_array){color, PATINA_UINT16, 3, 0};
+    zeros.scalar.data = scalar;
+    zeros.classes.data = classes;
+    none.normal = none.color = none.scalar = none.classes = (patina_array){0};
+    CHECK(build(at("wanted"), &none, &how, FEW), NULL);
+    CHECK(build(at("built"), &zeros, &how, 30000), NULL);
+    assert_same_file(at("built"), at("wanted"));
+    color[3 * (FEW - 1) + 1] = 77;
+    classes[FEW - 1] = 2;
+    none.color = zeros.color;
+    none.classes = zeros.classes;
+    CHECK(build(at("wanted"), &none, &how, FEW), NULL);
+    CHECK(build(at("built"), &zeros, &how, 30000), NULL);
+    assert_same_file(at("built"), at("wanted"));
+    patina_cloud *cloud = NULL;
+    patina_cloud_info info = {.struct_size = sizeof info};
+    CHECK(patina_cloud_open(at("built"), &cloud), NULL);
+    CHECK(patina_cloud_get_info(cloud, &info), cloud);
+    assert_true(info.has_colors && info.has_classes && !info.has_normals && !info.has_scalars);
+    patina_cloud_destroy(cloud);
+    free(normal);
+    free(scalar);
+    free(color);
+    free(classes);
     columns_free(&all);
 }
 
@@ -476,6 +536,7 @@ static int remove_folder(void **state)
     (void)state;
     remove(at("built"));
     remove(at("wanted"));
+    remove(at("again"));
     return rmdir(folder);
 }
 
@@ -483,10 +544,11 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_narrow_colors), cmocka_unit_test(test_spilled),
-        cmocka_unit_test(test_wrong_box),  cmocka_unit_test(test_hard),          cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_same_bytes),    cmocka_unit_test(test_opened_and_saved), cmocka_unit_test(test_narrow_colors),
+        cmocka_unit_test(test_dropped_zeros), cmocka_unit_test(test_spilled),          cmocka_unit_test(test_wrong_box),
+        cmocka_unit_test(test_hard),          cmocka_unit_test(test_refused),
 #ifndef _WIN32
-        cmocka_unit_test(test_full_disk),  cmocka_unit_test(test_killed),        cmocka_unit_test(test_at_once),
+        cmocka_unit_test(test_full_disk),     cmocka_unit_test(test_killed),           cmocka_unit_test(test_at_once),
 #endif
     };
 #ifdef _WIN32

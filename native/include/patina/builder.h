@@ -27,8 +27,8 @@ typedef struct patina_builder_desc {
         box_max[3];   // of all points, object units, as far as known; equal = not known. Wrong ones cost time alone
     uint32_t threads; // 0 = one per core
     uint32_t
-        narrow_colors; // 1 = UINT16 colours that 8 bits hold (all up to 255; or all low bytes zero; or all as their high bytes) become
-                       // bytes: 3 bytes a point at rest, not 12
+        narrow_colors; // 1 = UINT16 colours that 8 bits hold (all up to 255; or all low bytes zero; or all as their high bytes) become bytes,
+    // and normals, colours, scalars and classes that are zero at all points are left out, as if no piece had them
 } patina_builder_desc;
 
 // The file gets its name at the end, whole or not at all. Beside it lies, without a name, what is sorted: about 40 bytes a point and once
