@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -12,9 +13,9 @@ import numpy as np
 
 from ..jobs import Steps
 from ..native import PatinaError
-from .reading import Filter, PointFile, Progress, name_of, told
+from .reading import Filter, Pieces, PointFile, Progress, name_of, told
 
-__all__ = ["FORMATS", "Filter", "PointFile", "Progress", "name_of", "preview", "reader", "steps", "to_mesh", "told"]
+__all__ = ["FORMATS", "Filter", "Pieces", "PointFile", "Progress", "in_pieces", "name_of", "preview", "reader", "steps", "to_mesh", "told"]
 
 # One colour and one normal attribute, under names that every Blender from 3.4 on allows ("normal" is reserved
 # before 4.0) and that sync.attributes looks for.
@@ -46,6 +47,13 @@ def reader(path: Path) -> ModuleType:
 def steps(path: Path, wanted: Filter, progress: Progress) -> Steps[PointFile]:
     """A file's points, read in steps. PatinaError when it cannot be read."""
     return (yield from reader(path).steps(path, wanted, progress))
+
+
+def in_pieces(path: Path, least: int, names: Collection[str]) -> Pieces | None:
+    """The points of a file of more than least, with those scalars that are named; None where there are not so many, or where the
+    format is read whole. PatinaError when it cannot be read."""
+    pieces = getattr(reader(path), "in_pieces", None)
+    return pieces(path, least, names) if pieces else None
 
 
 def preview(path: Path) -> list[str]:

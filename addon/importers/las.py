@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import jobs, native, readers
 from . import crs
-from .reading import Filter, PointFile, Progress, colors_of, crs_notes, name_of, origin_of
+from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, name_of, origin_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
@@ -292,27 +292,74 @@ def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> job
     done = 0
     for piece in _pieces(path, header, SMALL_PIECE):
         progress.step(done / max(header.points, 1))
-        names = piece.dtype.names
-        positions = np.empty((len(piece), 3), np.float32)
-        for axis, name in enumerate("XYZ"):
-            positions[:, axis] = piece[name] * header.scale[axis] + (header.offset[axis] - origin[axis])
+        positions = _places(header, piece, origin)
         keep = slice(None) if wanted.keeps_all() else wanted.mask(done, positions, origin)
         done += len(piece)
-        found = {"positions": positions[keep]}
-        found |= {scalar: piece[name][keep] for scalar, name in _SCALARS.items() if name in names}
-        found["class"] = (piece["raw_classification"][keep] & 31 if "raw_classification" in names
-                          else piece["classification"][keep])
-        bits = piece["bit_fields"][keep]
-        share = 15 if "classification" in names else 7
-        found["return_number"] = bits & share
-        found["number_of_returns"] = bits >> (4 if share == 15 else 3) & share
-        if "gps_time" in names:
-            found["gps_time"] = piece["gps_time"][keep]
-        if "red" in names:
-            found["rgb"] = np.stack([piece[name][keep] for name in ("red", "green", "blue")], 1)
-        columns.add(_extras(header, piece, keep) | found)
+        columns.add(_extras(header, piece, keep) | {"positions": positions[keep]} | _fields(piece, keep))
         yield jobs.Pause()
     return _assemble(path, header, origin, columns)
+
+
+def _places(header: Header, piece: np.ndarray, origin: tuple[float, float, float]) -> np.ndarray:
+    positions = np.empty((len(piece), 3), np.float32)
+    for axis, name in enumerate("XYZ"):
+        positions[:, axis] = piece[name] * header.scale[axis] + (header.offset[axis] - origin[axis])
+    return positions
+
+
+def _fields(piece: np.ndarray, keep: np.ndarray | slice) -> dict[str, np.ndarray]:
+    """What the point format itself has, but positions."""
+    names = piece.dtype.names
+    found = {scalar: piece[name][keep] for scalar, name in _SCALARS.items() if name in names}
+    found["class"] = (piece["raw_classification"][keep] & 31 if "raw_classification" in names
+                      else piece["classification"][keep])
+    bits = piece["bit_fields"][keep]
+    share = 15 if "classification" in names else 7
+    found["return_number"] = bits & share
+    found["number_of_returns"] = bits >> (4 if share == 15 else 3) & share
+    if "gps_time" in names:
+        found["gps_time"] = piece["gps_time"][keep]
+    if "red" in names:
+        found["rgb"] = np.stack([piece[name][keep] for name in ("red", "green", "blue")], 1)
+    return found
+
+
+def in_pieces(path: Path, least: int, names: Collection[str]) -> Pieces | None:
+    """The points piece by piece, with those of their scalars that are named; None where there are not more than least."""
+    try:
+        header = read_header(path)
+    except OSError as error:
+        raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror}", -3) from None
+    if header.points <= least:
+        return None
+    origin = origin_of(header.lower, header.upper, float(header.scale.min()))
+    return Pieces(header.points, origin, (tuple(header.lower.tolist()), tuple(header.upper.tolist())), crs_notes(header.units),
+                  lambda progress: _each(path, header, origin, frozenset(names), progress))
+
+
+def _each(path: Path, header: Header, origin: tuple[float, float, float], names: frozenset[str],
+          progress: Progress) -> Iterator[PointFile | None]:
+    """None: nothing yet."""
+    start, passes, done = 0.0, 1, 0
+    if "gps_time" in names and "gps_time" in _record(path, header).names:  # which begins with the earliest, wherever that is
+        start, passes = np.inf, 2
+        for piece in _pieces(path, header, SMALL_PIECE):
+            progress.step(done / header.points / passes)
+            done += len(piece)
+            times = piece["gps_time"]
+            start = min(start, float(times[np.abs(times) <= MOST_SECONDS].min(initial=np.inf)))
+            yield None
+        start = start if np.isfinite(start) else 0.0
+    for piece in _pieces(path, header, SMALL_PIECE):
+        progress.step(done / header.points / passes)
+        done += len(piece)
+        found = _extras(header, piece, slice(None)) | _fields(piece, slice(None))
+        if "gps_time" in found:
+            times = found["gps_time"]
+            found["gps_time"] = np.where(np.abs(times) <= MOST_SECONDS, times - start, np.nan).astype(np.float32)
+        normals = next(([found[name] for name in normal] for normal in _normal_names(header) if all(name in found for name in normal)), None)
+        yield PointFile(name_of(path), _places(header, piece, origin), None if normals is None else np.stack(normals, 1).astype(np.float32),
+                        found.get("rgb"), {name: values for name, values in found.items() if name in names}, origin, 0)
 
 
 def _extras(header: Header, piece: np.ndarray, keep: np.ndarray | slice) -> dict[str, np.ndarray]:
@@ -330,16 +377,21 @@ def _extras(header: Header, piece: np.ndarray, keep: np.ndarray | slice) -> dict
     return found
 
 
-def _normals_of(header: Header, columns: _Columns) -> np.ndarray | None:
-    """Out of extra dimensions, as CloudCompare and PDAL write them."""
+def _normal_names(header: Header) -> Iterator[list[str]]:
+    """Of extra dimensions, as CloudCompare and PDAL write them."""
     by_name = {extra.name.lower(): extra.name for extra in header.extras}
     for names in (("normalx", "normaly", "normalz"), ("nx", "ny", "nz")):
         if all(name in by_name for name in names):
-            found = [columns.take(by_name[name]) for name in names]
-            normals = np.zeros((columns.count, 3), np.float32)
-            for axis, values in enumerate(found):
-                normals[:, axis] = 0.0 if values is None else values
-            return normals if any(values is not None for values in found) else None
+            yield [by_name[name] for name in names]
+
+
+def _normals_of(header: Header, columns: _Columns) -> np.ndarray | None:
+    for names in _normal_names(header):
+        found = [columns.take(name) for name in names]
+        normals = np.zeros((columns.count, 3), np.float32)
+        for axis, values in enumerate(found):
+            normals[:, axis] = 0.0 if values is None else values
+        return normals if any(values is not None for values in found) else None
     return None
 
 

@@ -75,6 +75,17 @@ class PointFile:
             invalid=int((~np.isfinite(self.positions[keep]).all(axis=1)).sum()))
 
 
+@dataclass(frozen=True)
+class Pieces:
+    """A file's points, which are never in memory all at once."""
+
+    count: int
+    origin: tuple[float, float, float]
+    box: tuple[tuple[float, float, float], tuple[float, float, float]]  # file coordinates, as far as known
+    notes: dict[str, str | float | list[float]]
+    each: Callable[[Progress], Iterator[PointFile | None]]  # all with the same arrays, relative to origin; colors rather (n, 3) uint16. None: a pause
+
+
 class Progress:
     """Of one file; value() and cancel() from any thread."""
 

@@ -26,6 +26,7 @@ from .abi import MAX_RAMP as MOST_RAMP
 from .abi import PASSES as PLANES
 from .loader import (
     CANCELLED,
+    FILE,
     FORMAT,
     INTERNAL,
     MEMORY,
@@ -41,7 +42,7 @@ from .loader import (
     split_plane,
 )
 
-__all__ = ["CANCELLED", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
+__all__ = ["CANCELLED", "FILE", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
            "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "Task", "Texture", "WRAPS", "forget_library",
            "library", "library_path", "log_lines", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
 

@@ -29,7 +29,8 @@ class Builder(_Handle):
     def add(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
             opacities: np.ndarray | None = None, radii: np.ndarray | None = None, scalars: np.ndarray | None = None,
             classes: np.ndarray | None = None, origin: Corner = (0.0,) * 3) -> None:
-        """The next points, as Cloud takes them; what the first piece has, all have. Colors of 16 bits that 8 hold become bytes."""
+        """The next points, as Cloud takes them; what the first piece has, all have. Colors of 16 bits that 8 hold become bytes;
+        normals, colors, scalars and classes that are zero everywhere are none."""
         self._call("add", byref(_describe(positions, normals, colors, opacities, radii, scalars, classes, 0, origin)))
 
     def start_end(self, progress: Progress | None = None) -> Task:

@@ -15,7 +15,7 @@ import numpy as np
 from bpy.types import Context, Object, Operator
 
 from .. import importers, jobs, native
-from ..sync import attributes, edits, linked
+from ..sync import attributes, edits, linked, scans_of
 from . import scans
 
 MOST_POINTS = 4_000_000  # looked at; of more every so-manieth
@@ -108,7 +108,7 @@ def _islands(graph: np.ndarray) -> list[np.ndarray]:
     return [np.flatnonzero(row) for row in np.unique(reach, axis=0)]
 
 
-def read(obj: Object, context: Context) -> tuple[np.ndarray, np.ndarray | None, linked.Scans | None, np.ndarray | None]:
+def read(obj: Object, context: Context) -> tuple[np.ndarray, np.ndarray | None, scans_of.Scans | None, np.ndarray | None]:
     """Positions, light or None, scans, and which of them each point is of. PatinaError where a linked file cannot be read."""
     if obj.patina.linked_file:
         notices: list[str] = []
@@ -117,7 +117,7 @@ def read(obj: Object, context: Context) -> tuple[np.ndarray, np.ndarray | None, 
             raise native.PatinaError(notices[0] if notices else "the file is missing")
         module = importers.reader(source.path)
         file = jobs.run(lambda: module.read(source.path, importers.Filter(), importers.Progress()), lambda: None, lambda: False)
-        return file.positions, _light(file.colors), *linked.scans_in(file.scalars)
+        return file.positions, _light(file.colors), *scans_of.scans_in(file.scalars)
     data = obj.data
     count = len(data.vertices if obj.type == 'MESH' else data.points)
     return (attributes.positions(data, count), _light(attributes.colors(data, count, obj.patina.color_attribute)), *scans.of_points(obj))

@@ -9,7 +9,7 @@ from bpy.types import Context, Object, Operator
 
 from .. import importers, native
 from ..importers import scans
-from ..sync import attributes, edits, linked
+from ..sync import attributes, edits, scans_of
 from . import points
 
 LOOK = ("gain", "gamma", "saturation", "temperature", "balance", "hide", "solo")
@@ -26,20 +26,20 @@ def refused(obj: Object | None) -> str:
     return ""
 
 
-def of_points(obj: Object) -> tuple[linked.Scans | None, np.ndarray | None]:
+def of_points(obj: Object) -> tuple[scans_of.Scans | None, np.ndarray | None]:
     """Which scans a mesh's or point cloud's points are of; None where there is one, or it is not said."""
     data = obj.data
     count = len(data.vertices if obj.type == 'MESH' else data.points)
-    columns = {name: attributes.scalars(data, count, name) for name in linked.SCAN_NAMES}
-    return linked.scans_in({name: values[:, 0] for name, values in columns.items() if values is not None})
+    columns = {name: attributes.scalars(data, count, name) for name in scans_of.SCAN_NAMES}
+    return scans_of.scans_in({name: values[:, 0] for name, values in columns.items() if values is not None})
 
 
-def known(obj: Object, context: Context) -> tuple[linked.Scans | None, np.ndarray | None]:
+def known(obj: Object, context: Context) -> tuple[scans_of.Scans | None, np.ndarray | None]:
     """The same of any object. PatinaError where its file cannot be read."""
     if not obj.patina.linked_file:
         return of_points(obj)
     cloud = points.cloud_of(obj, context)
-    return (linked.Scans(cloud.scan_name, cloud.scan_numbers), edits.scans_of(cloud)) if cloud.scan_name else (None, None)
+    return (scans_of.Scans(cloud.scan_name, cloud.scan_numbers), edits.scans_of(cloud)) if cloud.scan_name else (None, None)
 
 
 class OfScans:
@@ -83,7 +83,7 @@ class PATINA_OT_scans_list(OfScans, Operator):
         return {'FINISHED'}
 
 
-def listed(obj: Object, found: linked.Scans | None, of: np.ndarray | None) -> None:
+def listed(obj: Object, found: scans_of.Scans | None, of: np.ndarray | None) -> None:
     """Brings the object's list up to date."""
     group = obj.patina.points
     kept = {edits.number_of(item): {name: _value(item, name) for name in LOOK if item.is_property_set(name)} for item in group.scans}

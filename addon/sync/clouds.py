@@ -20,6 +20,7 @@ from ..properties import enum_number
 from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, ranges, roles, soft, splats
 from .analyzing import ANALYSES
 from .camera import row_major
+from .scans_of import SCAN_NAMES, Scans, scans_in
 
 # Clouds that the last picture did not use may stay up to this many bytes (24 a point): enough for the other view
 # layers and scenes of a session, little beside what Blender itself holds for the same points.
@@ -44,7 +45,7 @@ class PointArrays:
     analyzed: bool = False
     stations: analysis.Stations | None = None  # where the scanners stood
     numbers: np.ndarray | None = None  # (n, 1) float32, that points are soft by
-    scans: linked.Scans | None = None  # where there are several
+    scans: Scans | None = None  # where there are several
     scan_of: np.ndarray | None = None  # (n,) uint16, which of them each point is of
 
     def fingerprint(self) -> Steps[tuple[int, int]]:
@@ -627,7 +628,7 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     stations = analysis.stations(obj, data, count, analyzed == 2) if analyzed else None
     if analyzed == 2 and not (stations and stations.by_grid):
         notices.append(f"'{obj.name}': {analysis.NO_GRID}")
-    scans, scan_of = linked.scans_in({name: column[:, 0] for name in linked.SCAN_NAMES
+    scans, scan_of = scans_in({name: column[:, 0] for name in SCAN_NAMES
                                       if (column := attributes.scalars(data, count, name)) is not None})
     return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, bool(analyzed), stations, by, scans, scan_of)
 

@@ -22,16 +22,13 @@ from ..importers import crs
 from ..importers import scans as scans_of_files
 from ..importers.origin import PROPERTY
 from ..streaming import shelf
-from . import addresses, analysis, analyzing, attributes, cache, files, kept, sequence
+from . import addresses, analysis, analyzing, attributes, building, cache, files, kept, sequence
 from .colors import scalar_name
 from .losses import Loss
+from .scans_of import SCAN_ENDING, Scans, scans_in
 from .soft import attribute_name
 
 Corner = tuple[float, float, float]
-
-SCAN_ENDING = ".scan"
-SCAN_NAMES = (analysis.SCAN, "point_source_id")  # of the attributes that say which scan a point is of
-MOST_SCANS = 1024  # that the library grades
 
 
 @dataclass(frozen=True)
@@ -49,14 +46,6 @@ class Source:
 
     def identity(self) -> tuple:
         return ("linked", str(self.path), self.kept.name)
-
-
-@dataclass(frozen=True)
-class Scans:
-    """Which scan each point is of, by an attribute of the file; written beside the cloud, a uint16 for each point: index into numbers."""
-
-    name: str
-    numbers: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -176,17 +165,17 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """The same in steps."""
     if source.streamed:
         return (yield from _stream(source, progress))
-    notes = source.kept.with_suffix(".json")
-    try:
-        found = _linked(native.Cloud.open(source.kept), *kept.read_notes(notes), source.kept)
-        if found.scans and found.cloud.scan_file.stat().st_size != 2 * found.cloud.count:
-            raise ValueError("which scans the points are of is damaged")
-        with contextlib.suppress(OSError):  # of another user
-            os.utime(source.kept)  # used just now
-        kept.CHECKS.start(source.identity(), source.kept)
+    found = _opened(source)
+    if found:
         return found
-    except (native.PatinaError, OSError, ValueError):
-        pass  # not there yet, of another version, or damaged: it is made anew
+    pieces = importers.in_pieces(source.path, building.LARGE, building.names_of(source.scalar))
+    if pieces:
+        try:
+            return (yield from _build(source, pieces, progress))
+        except (native.PatinaError, OSError) as error:
+            if getattr(error, "code", native.FILE) != native.FILE or not building.fits_in_memory(pieces.count):
+                raise error if isinstance(error, native.PatinaError) else native.PatinaError(
+                    f"{source.kept}: cannot be written: {error.strerror}", native.FILE) from None
     parts = 3 if source.analyzed else 2
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
     seen_by = [points.scalars.get(name) for name in (analysis.SCAN, analysis.ROW, analysis.COLUMN)]
@@ -212,22 +201,104 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         yield task
         task.result()
     try:
-        place, state, _ = source.kept.stem.split("-")
-        for old in source.kept.parent.glob(f"{place}-*"):
-            if not old.name.startswith(f"{place}-{state}-"):  # of the file as it was
-                old.unlink()
+        _forget_older(source)
         task = cloud.start_save(source.kept)
         yield task
         task.result()
         if scans:
             scan_of.tofile(source.kept.with_suffix(SCAN_ENDING))
-        notes.write_text(json.dumps({"origin": origin, "scanners": scanners, "units": units, "scans": scans and asdict(scans),
-                                     "told": told}), "utf-8")
+        _write_notes(source.kept, origin, scanners, units, scans, told)
         _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
     return _linked(cloud, origin, scanners, units, scans and asdict(scans), told, source.kept)
+
+
+def _opened(source: Source) -> Linked | None:
+    """The kept cloud; None where it is not there yet, of another version, or damaged: it is made anew then."""
+    try:
+        found = _linked(native.Cloud.open(source.kept), *kept.read_notes(source.kept.with_suffix(".json")), source.kept)
+        if found.scans and found.cloud.scan_file.stat().st_size != 2 * found.cloud.count:
+            raise ValueError("which scans the points are of is damaged")
+        with contextlib.suppress(OSError):  # of another user
+            os.utime(source.kept)  # used just now
+        kept.CHECKS.start(source.identity(), source.kept)
+        return found
+    except (native.PatinaError, OSError, ValueError):
+        return None
+
+
+def _forget_older(source: Source) -> None:
+    """What is kept of the file as it was."""
+    place, state, _ = source.kept.stem.split("-")
+    for old in source.kept.parent.glob(f"{place}-*"):
+        if not old.name.startswith(f"{place}-{state}-"):
+            old.unlink()
+
+
+def _write_notes(place: Path, origin: Corner, scanners: list[float], units: list[float] | None, scans: Scans | None, told: str) -> None:
+    place.with_suffix(".json").write_text(json.dumps(
+        {"origin": origin, "scanners": scanners, "units": units, "scans": scans and asdict(scans), "told": told}), "utf-8")
+
+
+def _build(source: Source, pieces: importers.Pieces, progress: importers.Progress) -> jobs.Steps[Linked]:
+    """A large file's cloud: built on the disk without an analysis, kept so, and then analyzed. Whoever was killed between the two
+    goes on from there."""
+    parts = 3 if source.analyzed else 2
+    bare = _bare(source) if source.analyzed else source
+    found = _opened(bare) if source.analyzed else None
+    made = found is None
+    if made:
+        origin = source.origin or pieces.origin
+        offset = tuple(own - wanted for own, wanted in zip(pieces.origin, origin, strict=True))
+        with contextlib.suppress(OSError):
+            _forget_older(source)
+        scans = yield from building.steps(pieces, bare.kept, source.scalar, offset, source.hide_uncolored, progress, parts)
+        units, told = pieces.notes.get("units"), pieces.notes.get(scans_of_files.NOTE, "")
+        scanners = [value + offset[i % 3] for i, value in enumerate(pieces.notes.get("scanners", ()))]
+        _write_notes(bare.kept, origin, scanners, units, scans, told)
+        _tidy(bare.kept)
+        found = _linked(native.Cloud.open(bare.kept), origin, scanners, units, scans and asdict(scans), told, bare.kept)
+    if not source.analyzed:
+        return found
+    return (yield from _analyze(source, bare, found, made, progress.part(2, parts)))
+
+
+def _bare(wanted: Source) -> Source:
+    """The same without an analysis."""
+    found = source(wanted.path, wanted.origin, wanted.scalar, False, wanted.hide_uncolored, wanted.pattern)
+    if found is None:
+        raise native.PatinaError(f"{wanted.path}: is missing", native.FILE)
+    return found
+
+
+def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: importers.Progress) -> jobs.Steps[Linked]:
+    """Analyzes what was built, and keeps it; lets the cloud without go where nobody else asked for it."""
+    progress.doing = analysis.label(found.cloud)
+    units = None if found.units == (1.0, 1.0) else list(found.units)
+    notes = (found.origin, found.scanners, units, found.scans, found.told)
+    if found.scans:  # at once: another Blender may let the cloud without go
+        found.cloud.scan_file = shutil.copyfile(found.cloud.scan_file, source.kept.with_suffix(SCAN_ENDING))
+    with progress.inner() as inner:
+        task = analyzing.start(found.cloud, analysis.of_columns(found.scanners), inner)
+    yield task
+    task.result()
+    try:
+        task = found.cloud.start_save(source.kept)
+        yield task
+        task.result()
+        _write_notes(source.kept, *notes)
+        known = _linked(native.Cloud.open(source.kept), *notes[:3], found.scans and asdict(found.scans), found.told, source.kept)
+    except (native.PatinaError, OSError):
+        return found  # no room on the disk: what the analysis found stays in memory
+    if made:
+        found.cloud.close()
+        for ending in (bare.kept.suffix, ".json", SCAN_ENDING):
+            with contextlib.suppress(OSError):  # another Blender's, which Windows holds fast
+                bare.kept.with_suffix(ending).unlink(missing_ok=True)
+    _tidy(source.kept)
+    return known
 
 
 def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
@@ -271,21 +342,6 @@ def _classes(points: importers.PointFile) -> np.ndarray | None:
     found = next((name for name in attributes.CLASS_NAMES if name in points.scalars), "")
     values = _column(points, found)
     return None if values is None else attributes.as_classes(values)
-
-
-def scans_in(scalars: dict[str, np.ndarray]) -> tuple[Scans | None, np.ndarray | None]:
-    """What a file says of its points' scans, where it has several."""
-    name = next((name for name in SCAN_NAMES if name in scalars), "")
-    values = scalars.get(name)
-    if values is None or not len(values) or not (values.min() >= 0 and values.max() <= 65535):
-        return None, None
-    whole = values.astype(np.uint16)
-    numbers = np.flatnonzero(np.bincount(whole, minlength=1))
-    if not 1 < len(numbers) <= MOST_SCANS or (whole != values).any():
-        return None, None
-    places = np.zeros(65536, np.uint16)
-    places[numbers] = np.arange(len(numbers))
-    return Scans(name, tuple(numbers.tolist())), places[whole]
 
 
 def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None, units: list[float] | None,

@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linked clouds of large files are built on the disk, and are what they are where they are built in memory."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+from check_import import import_ply
+from harness import SCRATCH, Skip, check, new_scene, render
+from patina import importers, memory, native
+from patina.importers import las
+from patina.sync import building, linked
+
+bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
+
+LEAST = 10000  # here, of what is large
+FAR = np.array([500000.0, 5000000.0, 100.0])
+
+
+def scan_file(name, count=60000, form=3, **changes):
+    """A LAS as flown: a wavy ground in three strips, byte colors shifted, two classes, GPS times that do not begin with the least."""
+    rng = np.random.default_rng(5)
+    records = np.zeros(count, las._FORMATS[form])
+    places = np.column_stack([rng.uniform(-2, 2, (count, 2)), np.zeros(count)])
+    places[:, 2] = 0.2 * np.sin(3 * places[:, 0]) * np.cos(2 * places[:, 1]) - 6
+    for axis, letter in enumerate("XYZ"):
+        records[letter] = np.rint(places[:, axis] * 1e4)
+    records["intensity"] = rng.integers(1, 5000, count)
+    records["raw_classification"] = np.where(places[:, 0] > 0, 5, 2)
+    records["point_source_id"] = 7 + np.arange(count) * 3 // count * 2
+    records["gps_time"] = 1e5 + 1e-3 * (count // 2 - np.arange(count))
+    for shift, channel in enumerate(("red", "green", "blue")):
+        records[channel] = rng.integers(1 + shift, 200, count) * 256
+    for field, value in changes.items():
+        records[field] = value
+    ground = np.column_stack([records[letter] for letter in "XYZ"]) * 1e-4 + FAR
+    header = bytearray(227)
+    header[0:4], header[24:26] = b"LASF", bytes([1, 2])
+    header[94:96] = (227).to_bytes(2, "little")
+    header[96:100] = (227).to_bytes(4, "little")
+    header[104] = form
+    header[105:107] = records.dtype.itemsize.to_bytes(2, "little")
+    header[107:111] = count.to_bytes(4, "little")
+    lower, upper = ground.min(axis=0), ground.max(axis=0)
+    box = np.column_stack([upper, lower]).ravel()  # x most, x least, ...
+    header[131:227] = np.concatenate([[1e-4] * 3, FAR, box]).astype("<f8").tobytes()
+    path = SCRATCH / name
+    path.write_bytes(bytes(header) + records.tobytes())
+    return path
+
+
+class Small:
+    """Within: files of more than LEAST points are large, and read in pieces of 7000."""
+
+    def __enter__(self):
+        self.kept = building.LARGE, las.SMALL_PIECE
+        building.LARGE, las.SMALL_PIECE = LEAST, 7000
+
+    def __exit__(self, *_):
+        building.LARGE, las.SMALL_PIECE = self.kept
+
+
+def forget(source):
+    for path in SCRATCH.glob(source.kept.name.split("-")[0] + "-*"):
+        path.unlink()
+
+
+def both(path, **wanted):
+    """Built in memory, and on the disk: the bytes of the clouds' files, of their notes and of the scans beside, by ending."""
+    source = linked.source(path, **wanted)
+    found = []
+    for large in (False, True):
+        forget(source)
+        if large:
+            with Small():
+                linked.load(source)
+        else:
+            linked.load(source)
+        found.append({ending: place.read_bytes() if place.exists() else None for ending in (".cloud", ".json", ".scan")
+                      for place in (source.kept.with_suffix(ending),)})
+        if source.analyzed:  # the head says what the cloud took in memory, and a check sum of the head
+            head = bytearray(found[-1][".cloud"])
+            head[128:136] = head[504:512] = bytes(8)
+            found[-1][".cloud"] = bytes(head)
+        left = {item.suffix for item in SCRATCH.glob(source.kept.name.split("-")[0] + "-*")}
+        check(left <= {".cloud", ".json", ".scan"}, f"left over: {left}")
+        check(len(list(SCRATCH.glob(source.kept.name.split("-")[0] + "-*.cloud"))) == 1, "the cloud without an analysis stays")
+    return found
+
+
+def test_same_files():
+    """The cloud, its notes and its scans have the bytes that they have where the file is read whole: whatever a ramp lies over,
+    analyzed or not, relative to another origin, without colors."""
+    path, black = scan_file("large.las"), scan_file("large_black.las", red=0, green=0, blue=0)
+    bare = scan_file("large_bare.las", raw_classification=0, point_source_id=3, intensity=0)
+    for what, wanted in ((path, {}), (path, {"scalar": "gps_time"}), (path, {"scalar": "intensity", "analyzed": False}),
+                         (path, {"origin": (499999.0, 5000001.0, 90.0), "scalar": "class"}), (black, {"hide_uncolored": True}),
+                         (bare, {"scalar": "intensity"}), (path, {"hide_uncolored": True, "scalar": "point_source_id"})):
+        whole, pieces = both(what, **wanted)
+        for ending in whole:
+            check(whole[ending] == pieces[ending], f"{what.name} {wanted}: {ending} differs")
+    check(both(path)[1][".scan"] is not None, "no scans")
+
+
+def test_same_extras():
+    """Normals in extra dimensions, by laspy."""
+    try:
+        import laspy
+    except ImportError:
+        raise Skip("laspy is not installed here") from None
+    header = laspy.LasHeader(point_format=3, version="1.2")
+    header.scales, header.offsets = [1e-4] * 3, FAR
+    header.add_extra_dims([laspy.ExtraBytesParams(name, "f4") for name in ("NormalX", "NormalY", "NormalZ", "Deviation")])
+    data = laspy.LasData(header)
+    rng = np.random.default_rng(1)
+    data.x, data.y, data.z = (FAR + rng.normal(size=(30000, 3))).T
+    for name in ("NormalX", "NormalY", "NormalZ", "Deviation"):
+        data[name] = rng.normal(size=30000)
+    path = SCRATCH / "large_extras.las"
+    data.write(str(path))
+    for wanted in ({"scalar": "Deviation"}, {"analyzed": False}):
+        whole, pieces = both(path, **wanted)
+        check(whole == pieces, f"{wanted}: differs")
+    check(linked.load(linked.source(path)).cloud.has_normals, "no normals")
+
+
+def test_same_picture():
+    path = scan_file("large_picture.las")
+    pictures = []
+    for large in (False, True):
+        forget(linked.source(path))
+        new_scene()
+        if large:
+            with Small():
+                obj, = import_ply(path, link=True)
+        else:
+            obj, = import_ply(path, link=True)
+        obj.location = (-2, -2, -8)
+        pictures.append(render())
+        check(tuple(obj["patina_origin"]) != (0.0, 0.0, 0.0), "no origin")
+    for name, pixels in pictures[0].items():
+        check(np.array_equal(pixels, pictures[1][name], equal_nan=True), f"{name} differs")
+
+
+def test_cancelled_and_cut():
+    """Who cancels, loses interest, or has a file that ends too early finds nothing left; the next time it is read."""
+    path = scan_file("large_cancelled.las")
+    source = linked.source(path)
+    before = set(SCRATCH.iterdir())
+    with Small():
+        total = sum(1 for _ in linked.steps(source, importers.Progress()))
+        forget(source)
+        for at in range(0, total, 2):
+            progress = importers.Progress()
+            steps = linked.steps(source, progress)
+            for _ in range(at + 1):
+                next(steps)
+            if at % 4:
+                steps.close()
+            else:
+                progress.cancel()
+                try:
+                    for _ in steps:
+                        pass
+                except native.PatinaError as error:
+                    check(error.code == native.CANCELLED, str(error))
+            check(not source.kept.exists(), f"step {at}: a cloud was kept")
+            forget(source)
+            check(set(SCRATCH.iterdir()) == before, f"step {at}: {set(SCRATCH.iterdir()) - before}")
+        cut = SCRATCH / "large_cut.las"
+        cut.write_bytes(path.read_bytes()[:-40])
+        try:
+            linked.load(linked.source(cut))
+        except native.PatinaError as error:
+            check("ends after 59,998 of 60,000" in str(error) or "ends after 59,999 of 60,000" in str(error), str(error))
+        else:
+            check(False, "a cut file was read")
+        check(linked.load(source).cloud.count == 60000, "the next time it is read")
+
+
+def test_goes_on_behind_the_build():
+    """Whoever ends between build and analysis goes on from the cloud that was built."""
+    path = scan_file("large_half.las")
+    source = linked.source(path)
+    with Small():
+        linked.load(linked.source(path, analyzed=False))
+        read = las._pieces
+        las._pieces = lambda *arguments: 1 / 0
+        try:
+            check(linked.load(source).cloud.has_shapes, "not analyzed")
+        finally:
+            las._pieces = read
+    check(linked.source(path, analyzed=False).kept.exists(), "another object's cloud is gone")
+
+
+def test_full_disk():
+    """The disk is asked before anything is written; a file that memory holds is read whole then, others say what is wrong."""
+    path = scan_file("large_full.las")
+    source = linked.source(path)
+    begin = building.Builder.add
+
+    def full(*_arguments, **_more):
+        raise native.PatinaError("building it takes 3.0 GB on the disk, which has 1.0 GB left", native.FILE)
+
+    free, building.Builder.add = memory.free, full
+    try:
+        with Small():
+            check(linked.load(source).cloud.count == 60000, "not read whole")
+            forget(source)
+            memory.free = lambda: 1000
+            try:
+                linked.load(source)
+            except native.PatinaError as error:
+                check("which has 1.0 GB left" in str(error), str(error))
+            else:
+                check(False, "built without room")
+    finally:
+        memory.free, building.Builder.add = free, begin
+    check(not source.kept.exists(), "something was kept")
+
+
+OTHER = """
+import os
+import sys
+sys.path.insert(0, {here!r})
+import check_building
+from pathlib import Path
+check_building.bpy.utils.user_resource = lambda kind, path="", create=False: {folder!r}
+with check_building.Small():
+    print("begins", flush=True)
+    check_building.linked.load(check_building.linked.source(Path({path!r})))
+    print("has it", flush=True)
+os._exit(0)  # the bpy module may hang in its own clean-up
+"""
+
+
+def other(path):
+    """Another Blender, which builds the cloud of a file in this one's folder."""
+    text = OTHER.format(here=str(Path(__file__).resolve().parent), folder=str(SCRATCH), path=str(path))
+    program = [bpy.app.binary_path, "-b", "--factory-startup", "--python-use-system-env", "--python-expr"] if bpy.app.binary_path else [sys.executable, "-c"]
+    return subprocess.Popen([*program, text], stdout=subprocess.PIPE, text=True)
+
+
+def begins(process):
+    check(any(line.strip() == "begins" for line in process.stdout), "it did not begin")
+
+
+def test_two_at_once():
+    """Two Blenders build one cloud at a time; then one of them is killed: each time there is one whole cloud, and nothing beside."""
+    path = scan_file("large_two.las", 150000)
+    source = linked.source(path)
+    with Small():
+        linked.load(source)
+    wanted = source.kept.read_bytes()
+    for kill in (False, True):
+        forget(source)
+        both = [other(path) for _ in range(2)]
+        for process in both:
+            begins(process)
+        if kill:
+            time.sleep(0.3)
+            both[0].kill()
+        told = [process.communicate(timeout=300)[0] for process in both]
+        check("has it" in told[1] and (kill or "has it" in told[0]), f"{told}")
+        check(source.kept.read_bytes() == wanted, "another cloud")
+        with Small():
+            check(linked.load(source).cloud.has_shapes, "not analyzed")
+        left = {item.suffix for item in SCRATCH.glob(source.kept.name.split("-")[0] + "-*")}
+        check(kill or left == {".cloud", ".json", ".scan"}, f"left over: {left}")
+
+
+def test_killed():
+    """Killed at any moment: the next time the cloud is built, or found, and is whole."""
+    path = scan_file("large_killed.las", 150000)
+    source = linked.source(path)
+    with Small():
+        linked.load(source)
+    wanted = source.kept.read_bytes()
+    for wait in (0.1, 0.5):
+        forget(source)
+        process = other(path)
+        begins(process)
+        time.sleep(wait)
+        process.kill()
+        process.communicate()
+        with Small():
+            linked.load(source)
+        check(source.kept.read_bytes() == wanted, f"killed after {wait} s: another cloud")
+        left = {item.suffix for item in SCRATCH.glob(source.kept.name.split("-")[0] + "-*")}
+        check(left <= {".cloud", ".json", ".scan"}, f"killed after {wait} s: left over: {left}")
