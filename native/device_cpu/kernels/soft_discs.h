@@ -104,6 +104,14 @@ static inline void pt_soft_set_discs(const struct pt_soft_tile *tile, const uint
         out->groups[to + k] = k < count ? pt_soft_groups(spans[0][k], spans[1][k], spans[2][k], spans[3][k]) : 0;
 }
 
+// Asks for the records of the discs from i on: each is a miss of its own.
+static inline void pt_soft_fetch(const struct pt_soft_tile *tile, struct pt_soft_order *order, uint32_t i)
+{
+    pt_soft_order_to(order, i + PT_SOFT_TAKEN);
+    for (uint32_t k = i; k < i + PT_SOFT_TAKEN && k < order->count; k++)
+        __builtin_prefetch(tile->bins->points + PT_SOFT_WORDS * (size_t)(uint32_t)order->list[k]);
+}
+
 // The next discs of a list from i on, and which of them reach each of the groups.
 static inline void pt_soft_take(const struct pt_soft_tile *tile, struct pt_soft_order *order, uint32_t i, uint32_t groups,
                                 struct pt_soft_discs *out)
@@ -111,9 +119,9 @@ static inline void pt_soft_take(const struct pt_soft_tile *tile, struct pt_soft_
     const uint64_t *list = order->list + i;
     out->count = order->count - i < PT_SOFT_TAKEN ? order->count - i : PT_SOFT_TAKEN;
     out->plain = 1;
-    pt_soft_order_to(order, i + PT_SOFT_TAKEN);
-    for (uint32_t k = 0; k < out->count; k++) // each is a miss of its own
-        __builtin_prefetch(tile->bins->points + PT_SOFT_WORDS * (size_t)(uint32_t)list[k]);
+    if (i == 0)
+        pt_soft_fetch(tile, order, 0);
+    pt_soft_fetch(tile, order, i + PT_SOFT_TAKEN); // while these are drawn
     for (uint32_t k = 0; k < out->count; k += PT_LANES)
         pt_soft_set_discs(tile, list + k, pt_lanes_left(k, out->count), k, out);
     for (; groups; groups &= groups - 1) {
@@ -162,17 +170,31 @@ static inline struct pt_soft_group pt_soft_group_at(const struct pt_soft_tile *t
                                   vf_load(tile->from + at), vf_load(tile->to + at)};
 }
 
-// Which of the pixels disc k covers, and its q.
-PT_SOFT_INLINE vm pt_soft_covers(const struct pt_soft_discs *discs, uint32_t k, const struct pt_soft_group *own, vf *q)
+// Whether all of a group's pixels see all of the discs.
+static inline int pt_soft_clear(const struct pt_soft_tile *tile, const struct pt_soft_discs *discs, uint32_t group)
+{
+    const vf first = vf_set(discs->z[0]), last = vf_set(discs->z[discs->count - 1]);
+    vm clear = vm_first(PT_LANES);
+    for (uint32_t v = 0; v < PT_SOFT_VECTORS; v++) {
+        const struct pt_soft_group own = pt_soft_group_at(tile, group, v);
+        clear = vm_and(clear, vm_and(vf_lt(own.from, first), vf_le(last, own.to)));
+    }
+    return vm_bits(clear) == PT_ALL;
+}
+
+// Which of the pixels disc k covers, and its q. clear: all of them see it.
+PT_SOFT_INLINE vm pt_soft_covers(const struct pt_soft_discs *discs, uint32_t k, const struct pt_soft_group *own, int clear,
+                                 vf *q)
 {
     const vf dx = vf_set(discs->x[k]) - own->x, dy = vf_set(discs->y[k]) - own->y, z = vf_set(discs->z[k]);
     *q = vf_max((vf_set(discs->a[k]) * dx + vf_set(discs->b[k]) * dy) * dx + vf_set(discs->c[k]) * (dy * dy), vf_zero());
-    return vm_and(vf_lt(*q, vf_set(1.0f)), vm_and(vf_lt(own->from, z), vf_le(z, own->to)));
+    const vm there = vf_lt(*q, vf_set(1.0f));
+    return clear ? there : vm_and(there, vm_and(vf_lt(own->from, z), vf_le(z, own->to)));
 }
 
 // What the discs take of a group's light; whether it takes any more.
 PT_SOFT_INLINE int pt_soft_add_discs(struct pt_soft_tile *tile, const struct pt_soft_discs *discs, uint32_t group, int counted,
-                                     int plain, vf *fragments)
+                                     int plain, int clear, vf *fragments)
 {
     const vf one = vf_set(1.0f), spent = vf_set(PT_SOFT_SPENT), last = vf_set(discs->z[discs->count - 1]);
     vm open = vm_of_bits(0);
@@ -184,7 +206,7 @@ PT_SOFT_INLINE int pt_soft_add_discs(struct pt_soft_tile *tile, const struct pt_
         for (uint64_t left = discs->reaching[group]; left; left &= left - 1) {
             const uint32_t k = (uint32_t)__builtin_ctzll(left);
             vf q;
-            const vm there = pt_soft_covers(discs, k, &own, &q), some = vm_and(there, vf_le(spent, through));
+            const vm there = pt_soft_covers(discs, k, &own, clear, &q), some = vm_and(there, vf_le(spent, through));
             if (PT_LANES == 1 && !vm_bits(there))
                 continue;
             const vf f = pt_soft_cosine(q), share = plain ? f : pt_soft_share_of(discs->weight[k], q, f);
@@ -223,7 +245,7 @@ PT_SOFT_INLINE int pt_soft_add_splats(struct pt_soft_tile *tile, const struct pt
         for (uint64_t left = discs->reaching[group]; left; left &= left - 1) {
             const uint32_t k = (uint32_t)__builtin_ctzll(left);
             vf q;
-            const vm there = pt_soft_covers(discs, k, &own, &q), first = vm_not(vf_lt(zero, weight)),
+            const vm there = pt_soft_covers(discs, k, &own, 0, &q), first = vm_not(vf_lt(zero, weight)),
                      some = vm_and(there, vm_or(first, vf_le(vf_set(discs->z[k]), front)));
             if (PT_LANES == 1 && !vm_bits(there))
                 continue;
@@ -280,9 +302,11 @@ static inline void pt_soft_draw_discs(struct pt_soft_tile *tile, struct pt_soft_
                 more = counted ? pt_soft_add_splats(tile, &discs, group, 1, &fragments)
                                : pt_soft_add_splats(tile, &discs, group, 0, &fragments);
             else if (counted || !discs.plain)
-                more = pt_soft_add_discs(tile, &discs, group, counted, 0, &fragments);
+                more = pt_soft_add_discs(tile, &discs, group, counted, 0, 0, &fragments);
+            else if (pt_soft_clear(tile, &discs, group))
+                more = pt_soft_add_discs(tile, &discs, group, 0, 1, 1, &fragments);
             else
-                more = pt_soft_add_discs(tile, &discs, group, 0, 1, &fragments);
+                more = pt_soft_add_discs(tile, &discs, group, 0, 1, 0, &fragments);
             if (!more)
                 open &= ~(1u << group);
         }

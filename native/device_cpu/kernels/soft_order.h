@@ -8,7 +8,8 @@
 #include <string.h>
 
 enum {
-    PT_SOFT_BUCKETS = 256,
+    PT_SOFT_BUCKETS = 4096, // at most; of a short list fewer, each of some PT_SOFT_OWN
+    PT_SOFT_OWN = 8,
     PT_SOFT_FEW = 40 // in a bucket; of more, digits are sorted
 };
 
@@ -22,8 +23,10 @@ struct pt_soft_order {
 // Puts `list` into buckets in `room`, both of `count`; the list's memory is used on.
 static inline void pt_soft_order_open(struct pt_soft_order *order, uint64_t *list, uint64_t *room, uint32_t count)
 {
-    uint32_t least = UINT32_MAX, most = 0, at = 0;
+    uint32_t least = UINT32_MAX, most = 0, at = 0, buckets = 64;
     int shift = 0;
+    while (buckets < PT_SOFT_BUCKETS && buckets * PT_SOFT_OWN < count)
+        buckets *= 2;
     order->list = room;
     order->other = list;
     order->count = count;
@@ -33,12 +36,12 @@ static inline void pt_soft_order_open(struct pt_soft_order *order, uint64_t *lis
         least = z < least ? z : least;
         most = z > most ? z : most;
     }
-    while (count && (most - least) >> shift >= PT_SOFT_BUCKETS)
+    while (count && (most - least) >> shift >= buckets)
         shift++;
-    memset(order->ends, 0, sizeof order->ends);
+    memset(order->ends, 0, buckets * sizeof *order->ends);
     for (uint32_t i = 0; i < count; i++)
         order->ends[((uint32_t)(list[i] >> 32) - least) >> shift]++;
-    for (uint32_t k = 0; k < PT_SOFT_BUCKETS; k++) {
+    for (uint32_t k = 0; k < buckets; k++) {
         const uint32_t own = order->ends[k];
         order->ends[k] = at;
         at += own;
