@@ -20,7 +20,7 @@ scans against exact views; half an hour more where these are not kept yet), inde
 (ten minutes of work in Blender), analysis (what every point knows, 10 million), files (a town of 100 million points under a cap, 2.7 GB
 on the disk), walk (frame by frame
 through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs), soft (soft points in the sizes
-of [S Table 1], and against OSPRay), platforms (Blender's start with the add-on, sizes of packages, instructions of NEON's inner
+of [S Table 1], its models and orders, and against OSPRay), platforms (Blender's start with the add-on, sizes of packages, instructions of NEON's inner
 loops). With --quick they take a million points, and one
 minute. Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor)
 and scaling (threads up to all cores).
@@ -50,12 +50,14 @@ import page
 import papers
 import peers
 import plots
+import presort
 import quoted
 import ranges
 import readme
 import report
 import scans
 import soft
+import soft_models
 import soft_points
 import stage
 import start
@@ -236,6 +238,8 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
     "instructions": ("platforms", "Instructions of inner loops, NEON's against AVX2's",
                      lambda options: instructions.table(options.library.parent, ROOT / "build/out/linux-arm64")),
     "soft points": ("soft", "[S Table 1]: frames a second on a GTX 1080 → ours", lambda options: soft_points.text(options.quick, options.library)),
+    "soft models": ("soft", "[S Figs. 6, 7]: differences from Base", lambda options: soft_models.text(options.quick, options.library)),
+    "presort": ("soft", "[S]'s presorted orders against the exact one", lambda options: presort.text(options.quick, options.library)),
     "volumes": ("soft", "Soft points and OSPRay's particle volume", lambda options: volumes.text(options.quick, options.library)),
     "session": ("session", "A long session", lambda options: quoted.session(1 if options.quick else 10, options.library)),
 }
