@@ -334,7 +334,17 @@ def in_pieces(path: Path, least: int, names: Collection[str]) -> Pieces | None:
         return None
     origin = origin_of(header.lower, header.upper, float(header.scale.min()))
     return Pieces(header.points, origin, (tuple(header.lower.tolist()), tuple(header.upper.tolist())), crs_notes(header.units),
-                  lambda progress: _each(path, header, origin, frozenset(names), progress))
+                  lambda progress: _told(path, header, _each(path, header, origin, frozenset(names), progress)))
+
+
+def _told(path: Path, header: Header, pieces: Iterator[PointFile | None]) -> Iterator[PointFile | None]:
+    """The pieces; what keeps them from being read as PatinaError."""
+    try:
+        yield from pieces
+    except (MemoryError, OverflowError):
+        raise native.PatinaError(f"{path.name}: memory is short for its {header.points:,} points", -2) from None
+    except OSError as error:
+        raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror or error}", -3) from None
 
 
 def _each(path: Path, header: Header, origin: tuple[float, float, float], names: frozenset[str],

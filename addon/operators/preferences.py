@@ -156,8 +156,11 @@ def cache_text() -> str:
 
 def pages_held() -> tuple[int, int]:
     """Parts of files that are kept, and their bytes; looked up now and then, for panels are drawn often."""
-    if not _looked or time.monotonic() - _looked[0][0] > LOOK:
-        _looked[:] = [(time.monotonic(), cache.pages_held())]
+    if not _looked or time.monotonic() > _looked[0][0]:
+        began = time.monotonic()
+        found = cache.pages_held()
+        now = time.monotonic()
+        _looked[:] = [(now + max(LOOK, 50.0 * (now - began)), found)]  # a slow disk is asked seldom
     return _looked[0][1]
 
 

@@ -57,5 +57,7 @@ class Stepped:
         """Blender ends it, or the choice of files was given up."""
         if self._steps:
             self._progress.cancel()
+            if self._task:
+                self._task.close()  # waits for what its steps hold
             self._steps.close()
             context.workspace.status_text_set(None)

@@ -82,6 +82,8 @@ def read_tree(source: Source) -> Tree:
         raise SourceError(f"{name} is damaged: bounds, span, schema or types are none of EPT's") from None
     if packed not in ENDINGS:
         raise SourceError(f"its points are packed as '{str(packed)[:40]}', which is not read: laszip and binary are")
+    if packed == "binary" and any(fields[axis][0].startswith("V") for axis in "XYZ"):
+        raise SourceError(f"{name} is damaged: X, Y or Z is no number that EPT has")
     if bounds.shape != (6,) or tight.shape != (6,) or not np.isfinite([*bounds, *tight, span, *scale, *offset]).all() or not span > 0 or not (scale > 0).all():
         raise SourceError(f"{name} is damaged: bounds, span or scale are none")
     sides = bounds[3:] - bounds[:3]

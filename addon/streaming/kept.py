@@ -7,21 +7,27 @@ import contextlib
 import json
 import os
 import shutil
+import time
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
 import shelf
-from source import MOST_BYTES, Source, SourceError, State, Unreachable
+from source import MOST_BYTES, Resting, Source, SourceError, State, Unreachable
+
+MOST_FAILURES, REST = 3, 60.0  # parts in a row that could not be fetched; seconds for which nobody is asked then
 
 
 class Kept(Source):
     """What is there of another version than the file's own is thrown away."""
 
+    keeps = True
+
     def __init__(self, source: Source, keep: shelf.Shelf, folder: Path) -> None:
         """SourceError where nobody answers and nothing is kept of it."""
         self.name, self.away = source.name, ""  # away: why nobody could be asked whether it is still the same
         self._source, self._shelf = source, keep
+        self._failures, self._rests_until, self._why = 0, 0.0, ""
         own = shelf.place_of(folder, source.name)
         told = shelf.about(own)
         version = told.pop("version") if told else ""
@@ -35,7 +41,7 @@ class Kept(Source):
             state, self.away = known, str(error)
         if known is None or not known.is_of(state):
             old, version = version, os.urandom(8).hex()
-            keep.write(own / shelf.ABOUT, json.dumps({"place": source.name, "version": version, **asdict(state)}).encode())
+            keep.write(own / shelf.ABOUT, json.dumps({"place": source.name.partition("?")[0], "version": version, **asdict(state)}).encode())
             if old:
                 shutil.rmtree(own / old, ignore_errors=True)
         self._own = own / version
@@ -52,16 +58,25 @@ class Kept(Source):
         if key:
             with contextlib.suppress(OSError):
                 self._path(key).unlink()
-        elif not self.away:
+        elif not self.away and not self._failures:  # what is kept may be as good as ever
             shutil.rmtree(self._own, ignore_errors=True)
 
     def _get(self, key: str, fetch: Callable[[], bytes]) -> bytes:
+        if not self.settled:
+            self._shelf.last.append(self._path(key))
         data = self._shelf.take(self._path(key), key)
         if data is None:
+            if time.monotonic() < self._rests_until:
+                raise Resting(self._why)
             try:
                 data = fetch()
             except SourceError as error:
-                raise type(error)(f"{error}, and the cache does not hold it" if self.away else str(error)) from None
+                self._why = f"{error}, and the cache does not hold it" if self.away else str(error)
+                self._failures += 1
+                if self._failures >= MOST_FAILURES:
+                    self._rests_until = time.monotonic() + REST
+                raise type(error)(self._why) from None
+            self._failures = 0
             self._put(key, data)
         return data
 

@@ -21,7 +21,7 @@ import copc  # noqa: E402
 import ept  # noqa: E402
 from address import is_ept  # noqa: E402
 from kept import kept  # noqa: E402
-from source import SourceError, source_of  # noqa: E402
+from source import Resting, SourceError, source_of  # noqa: E402
 
 MOST_FAILURES = 3  # pages in a row that cannot be fetched: then nothing else is tried until somebody asks again
 MOST_WAITING = 64  # pages that lie there until Blender takes them
@@ -39,9 +39,11 @@ class Reader:
             self._tree = self._kind.read_tree(self._source)
             first = self._kind.fetch(self._tree, 0, self._source)
             self._kind.learn(self._tree, first, self._kind.unpack(self._tree, 0, first))
-        except Exception:
-            self._source.forget()
+        except Exception as error:
+            if not isinstance(error, (ImportError, MemoryError)):
+                self._source.forget()
             raise
+        self._source.settled = True
         self._scalar = self._scalar if self._kind.has_scalar(self._tree, self._scalar) else ""
         self._queue: list[int] = []
         self._done: set[int] = set()
@@ -88,7 +90,14 @@ class Reader:
         while True:
             page = self._next()
             try:
-                self._unpack(page)
+                try:
+                    self._unpack(page)
+                except OSError:
+                    raise
+                except Exception as error:  # of a reader: who waits for the page is told
+                    with self._change:
+                        self._done.discard(page)
+                    self._put(f"{page}.bad", f"page {page}: {type(error).__name__}: {error}".encode("utf-8", "replace"))
             except OSError:  # the folder is gone: so is Blender
                 os._exit(1)
 
@@ -99,9 +108,10 @@ class Reader:
             with self._change:
                 self._done.discard(page)
                 self._failures += 1
-                down = self._failures >= MOST_FAILURES
+                down = self._failures >= MOST_FAILURES and not self._source.keeps
                 self._queue = [] if down else self._queue
-            self._put("down" if down else f"{page}.bad", f"page {page}: {error}".encode("utf-8", "replace"))
+            text = str(error) if isinstance(error, Resting) else f"page {page}: {error}"
+            self._put("down" if down else f"{page}.bad", text.encode("utf-8", "replace"))
             return
         with self._change:
             self._failures = 0

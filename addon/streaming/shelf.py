@@ -14,6 +14,7 @@ import errno
 import hashlib
 import json
 import os
+import re
 import shutil
 import threading
 import time
@@ -27,6 +28,9 @@ LEAST_FREE = 256 << 20  # bytes that others shall find on the disk
 FORGOTTEN = 3600.0  # seconds after which a file that was never finished belongs to nobody
 _MARK = b"PATINA01"
 _SUM = 16  # bytes
+_PLACE, _VERSION = re.compile("[0-9a-f]{32}"), re.compile("[0-9a-f]{16}")  # what folders are called: others are not looked into
+_HALF = re.compile(r".+\.(kept|json)\.\d+-\d+\.part")
+TRIES = 6  # to take a name that somebody looks at just now, which Windows then holds fast
 
 
 class Shelf:
@@ -38,6 +42,7 @@ class Shelf:
         self._off = False
         self._held: int | None = None  # bytes, as they were counted last
         self._new = 0  # since then
+        self.last: list[Path] = []  # go last: without them nothing can be shown
 
     def take(self, path: Path, key: str) -> bytes | None:
         """None: it is not there, or torn."""
@@ -71,10 +76,17 @@ class Shelf:
             if shutil.disk_usage(path.parent).free < self._least_free + len(raw):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             part.write_bytes(raw)
-            os.replace(part, path)
-        except FileNotFoundError:  # somebody clears it just now
-            return False
+            for left in reversed(range(TRIES)):
+                try:
+                    os.replace(part, path)
+                    break
+                except PermissionError:
+                    if not left or os.name != "nt":
+                        raise
+                    time.sleep(0.015)
         except OSError as error:
+            if isinstance(error, FileNotFoundError) and self._folder.is_dir():  # somebody clears it just now
+                return False
             with contextlib.suppress(OSError):
                 part.unlink()
             with self._lock:
@@ -85,17 +97,18 @@ class Shelf:
         return True
 
     def _tidy(self) -> None:
+        for path in self.last:
+            with contextlib.suppress(OSError):
+                os.utime(path)
         found = sorted(files(self._folder), key=lambda item: item[2])
         self._held, self._new = sum(size for _, size, _ in found), 0
+        goal = self._most - self._most // 16 if self._held > self._most else self._held  # room for a while: to look through all takes time
         for path, size, _ in found:
-            if self._held <= self._most:
+            if self._held <= goal:
                 break
-            with contextlib.suppress(FileNotFoundError):
-                try:
-                    path.unlink()
-                except PermissionError:  # another's, which Windows holds fast
-                    continue
-            self._held -= size
+            with contextlib.suppress(OSError):  # another's, which Windows holds fast
+                path.unlink(missing_ok=True)
+                self._held -= size
 
 
 def place_of(folder: Path, place: str) -> Path:
@@ -111,7 +124,7 @@ def about(own: Path) -> dict[str, Any] | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     texts = [value for name, value in found.items() if name != "total"]
-    right = all(isinstance(text, str) for text in texts) and found["version"].isalnum() and isinstance(found["total"], (int, type(None)))
+    right = all(isinstance(text, str) for text in texts) and _VERSION.fullmatch(found["version"]) is not None and isinstance(found["total"], (int, type(None)))
     return found if right else None
 
 
@@ -126,21 +139,21 @@ def _sum(key: str, data: bytes) -> bytes:
 
 def files(folder: Path) -> Iterator[tuple[Path, int, float]]:
     """Path, bytes and time of last use of all that is kept. What was never finished, and belongs to nobody any more, goes."""
-    for place in _folders(folder):
-        for version in _folders(place):
+    for place in _folders(folder, _PLACE):
+        for version in _folders(place, _VERSION):
             with contextlib.suppress(OSError), os.scandir(version) as found:
                 for entry in found:
                     with contextlib.suppress(OSError):
                         status = entry.stat()
                         if entry.name.endswith(ENDING):
                             yield Path(entry.path), status.st_size, status.st_mtime
-                        elif entry.name.endswith(".part") and time.time() - status.st_mtime > FORGOTTEN:
+                        elif _HALF.fullmatch(entry.name) and time.time() - status.st_mtime > FORGOTTEN:
                             os.unlink(entry.path)
 
 
-def _folders(folder: Path) -> list[Path]:
+def _folders(folder: Path, called: re.Pattern[str]) -> list[Path]:
     with contextlib.suppress(OSError), os.scandir(folder) as found:
-        return [Path(entry.path) for entry in found if entry.is_dir(follow_symlinks=False)]
+        return [Path(entry.path) for entry in found if called.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False)]
     return []
 
 
@@ -151,11 +164,10 @@ def clear(folder: Path) -> tuple[int, int]:
         with contextlib.suppress(OSError):  # another Blender's, which Windows holds fast
             path.unlink()
             count, size = count + 1, size + held
-    for place in _folders(folder):
-        if (place / ABOUT).is_file():
+    for place in _folders(folder, _PLACE):
+        with contextlib.suppress(OSError):
+            (place / ABOUT).unlink(missing_ok=True)
+        for empty in [*_folders(place, _VERSION), place]:
             with contextlib.suppress(OSError):
-                (place / ABOUT).unlink()
-            for empty in [*_folders(place), place]:
-                with contextlib.suppress(OSError):
-                    empty.rmdir()
+                empty.rmdir()
     return count, size

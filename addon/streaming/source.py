@@ -32,6 +32,10 @@ class Unreachable(SourceError):
     """Nobody answers: the file may be as it was."""
 
 
+class Resting(SourceError):
+    """Nobody answered a while ago, and is not asked again yet."""
+
+
 @dataclass(frozen=True)
 class State:
     """What tells a version of a file from another; as far as it is known."""
@@ -53,6 +57,8 @@ class Source:
     """Of one file: read(). Of a folder that ept.json tells of: file(). From any thread."""
 
     name = ""
+    keeps = False  # some of it may be there though nobody answers
+    settled = False  # what tells of its pages was read
 
     def read(self, offset: int, size: int) -> bytes:
         raise NotImplementedError

@@ -27,9 +27,9 @@ def names_of(scalar: str) -> set[str]:
 
 
 def fits_in_memory(count: int) -> bool:
-    """Where the disk lacks room, a file may still be read whole."""
+    """Where the disk lacks room, a file may still be read whole; where nobody tells what is free, as smaller ones are."""
     free = memory.free()
-    return free is not None and free > BYTES * count
+    return free is None or free > BYTES * count
 
 
 def steps(pieces: importers.Pieces, place: Path, scalar: str, offset: Corner, hide_uncolored: bool, progress: importers.Progress,
@@ -55,8 +55,11 @@ def steps(pieces: importers.Pieces, place: Path, scalar: str, offset: Corner, hi
         writing.doing = f"Building {pieces.count:,} points on the disk"
         with writing.inner() as inner:
             task = builder.start_end(inner)
-        yield task
-        task.result()
+        try:
+            yield task
+            task.result()
+        finally:
+            task.close()  # which waits: the builder goes after it
         return scans.keep()
 
 

@@ -18,6 +18,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..importers.reading import told
+from ..streaming.address import is_ept
 from . import addresses, kept, sequence
 
 _TEXT = "linked_file"
@@ -69,7 +70,7 @@ def path_of(obj: bpy.types.Object) -> Path | addresses.Address | None:
         text = text_of(original)
         return Path(bpy.path.abspath(text, library=original.library)) if text else None
     path = Path(bpy.path.abspath(volume.filepath, library=volume.library))
-    if volume.packed_file and not volume.is_sequence:  # of those Blender packs the first
+    if volume.packed_file and not volume.is_sequence and not is_ept(str(path)):  # of those Blender packs the first, and what tells of them
         return _put_down(volume.packed_file, path)
     return (sequence.pattern_of(path) or path) if volume.is_sequence else path
 

@@ -173,7 +173,11 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         try:
             return (yield from _build(source, pieces, progress))
         except (native.PatinaError, OSError) as error:
-            if getattr(error, "code", native.FILE) != native.FILE or not building.fits_in_memory(pieces.count):
+            code = getattr(error, "code", native.FILE)
+            found = _opened(source) if code == native.FILE else None
+            if found:  # another Blender has made it meanwhile
+                return found
+            if code != native.FILE or not building.fits_in_memory(pieces.count):
                 raise error if isinstance(error, native.PatinaError) else native.PatinaError(
                     f"{source.kept}: cannot be written: {error.strerror}", native.FILE) from None
     parts = 3 if source.analyzed else 2
@@ -294,9 +298,7 @@ def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: 
         return found  # no room on the disk: what the analysis found stays in memory
     if made:
         found.cloud.close()
-        for ending in (bare.kept.suffix, ".json", SCAN_ENDING):
-            with contextlib.suppress(OSError):  # another Blender's, which Windows holds fast
-                bare.kept.with_suffix(ending).unlink(missing_ok=True)
+        _let_go(bare.kept)
     _tidy(source.kept)
     return known
 
@@ -323,14 +325,23 @@ def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
 
 def _tidy(newest: Path) -> None:
     """Lets the clouds go that were not used for longest, where all together are too large."""
-    clouds = sorted((-path.stat().st_mtime_ns, path.stat().st_size, path) for path in newest.parent.glob("*.cloud"))
+    clouds = []
+    for path in newest.parent.glob("*.cloud"):
+        with contextlib.suppress(OSError):  # another Blender lets it go just now
+            status = path.stat()
+            clouds.append((-status.st_mtime_ns, status.st_size, path))
     total = 0
-    for _, size, path in clouds:
+    for _, size, path in sorted(clouds):
         total += size
         if total > preferences.cache_bytes() and path != newest:
-            path.unlink()
-            for ending in (".json", SCAN_ENDING):
-                path.with_suffix(ending).unlink(missing_ok=True)
+            _let_go(path)
+
+
+def _let_go(path: Path) -> None:
+    """A cloud first, then what belongs to it: where the cloud is another Blender's, which Windows holds fast, all stays."""
+    with contextlib.suppress(OSError):
+        for ending in (path.suffix, ".json", SCAN_ENDING):
+            path.with_suffix(ending).unlink(missing_ok=True)
 
 
 def _column(points: importers.PointFile, name: str) -> np.ndarray | None:

@@ -23,6 +23,7 @@ from range_server import NOTHING
 
 FOLDER = SCRATCH / "pages kept"
 POINTS = 3000  # ten nodes
+PART = f"{0:032x}/{0:016x}"  # what folders of a shelf are called
 
 
 @contextmanager
@@ -214,7 +215,7 @@ def test_no_room():
         check(len(said) == 1 and "nothing more is kept in" in said[0] and str(occupied) in said[0], f"{said}")
         check(occupied.read_text() == "mine", "it is gone")
         print(f"  {said[0]}")
-    said, place = [], FOLDER / "a/b/1.kept"
+    said, place = [], FOLDER / PART / "1.kept"
     for full in (OSError(28, "No space left on device"), PermissionError(13, "Permission denied"), OSError(30, "Read-only file system")):
         shutil.rmtree(FOLDER, ignore_errors=True)
         said.clear()
@@ -222,9 +223,9 @@ def test_no_room():
         keep.put(place, "1", b"before")
         with mock.patch.object(Path, "write_bytes", side_effect=full):
             for _ in range(3):
-                keep.put(FOLDER / "a/b/2.kept", "2", b"after")
+                keep.put(FOLDER / PART / "2.kept", "2", b"after")
         check(len(said) == 1 and full.strerror in said[0], f"{said}")
-        check(keep.take(place, "1") == b"before" and keep.take(FOLDER / "a/b/2.kept", "2") is None, "what was there is lost")
+        check(keep.take(place, "1") == b"before" and keep.take(FOLDER / PART / "2.kept", "2") is None, "what was there is lost")
         check(os.listdir(place.parent) == ["1.kept"], f"{os.listdir(place.parent)}")
     said.clear()
     shelf.Shelf(FOLDER, 1 << 20, said.append, least_free=1 << 60).put(place, "1", b"more")
@@ -246,16 +247,17 @@ def test_no_more_than_the_cap():
             equal(whole, opened(address), "again")
     keep, now = shelf.Shelf(FOLDER, 1000, print), time.time()
     shutil.rmtree(FOLDER, ignore_errors=True)
-    places = [FOLDER / f"a/b/{k}.kept" for k in range(5)]
+    places = [FOLDER / PART / f"{k}.kept" for k in range(5)]
     for k, place in enumerate(places[:4]):
         keep.put(place, str(k), bytes(200))
         os.utime(place, (now - 100 + k, now - 100 + k))
     keep.take(places[0], "0")
-    (FOLDER / "a/b/x.part").write_text("")  # of one that was killed long ago
-    os.utime(FOLDER / "a/b/x.part", (0, 0))
+    half = FOLDER / PART / "1.kept.77-1.part"  # of one that was killed long ago
+    half.write_text("")
+    os.utime(half, (0, 0))
     keep.put(places[4], "4", bytes(200))
-    check([place.exists() for place in places] == [True, False, True, True, True], f"{os.listdir(FOLDER / 'a/b')}")
-    check(not (FOLDER / "a/b/x.part").exists(), "half a file stays")
+    check([place.exists() for place in places] == [True, False, True, True, True], f"{os.listdir(FOLDER / PART)}")
+    check(not half.exists(), "half a file stays")
     keep.put(places[1], "1", bytes(2000))
     check(not places[1].exists(), "larger than all may be")
 
@@ -269,7 +271,7 @@ folder, chance, found = Path(sys.argv[2]), random.Random(int(sys.argv[3])), 0
 keep = shelf.Shelf(folder, 40000, lambda text: sys.exit(text))
 for _ in range(1500):
     key = str(chance.randrange(40))
-    path, data = folder / "a" / "b" / (key + ".kept"), key.encode() * 1000
+    path, data = folder / ("0" * 32) / ("0" * 16) / (key + ".kept"), key.encode() * 1000
     got = keep.take(path, key)
     assert got in (None, data), key
     found += got is not None
@@ -292,6 +294,49 @@ def test_two_at_once():
         print(f"  found {said.strip()} of 1500")
     held = sum(size for _, size, _ in shelf.files(FOLDER))
     check(held <= 40000 * (1 + 2 / 16) and not list(FOLDER.rglob("*.part")), f"{held}")
+
+
+def test_what_is_not_ours_stays():
+    """In a folder that holds other things: neither looking nor clearing nor the cap takes them."""
+    shutil.rmtree(FOLDER, ignore_errors=True)
+    theirs = [FOLDER / name for name in ("films/x/film.mkv.part", "site/about.json", "site/old/1.kept", f"{PART}/film.mkv.part", "notes.kept")]
+    for place in theirs:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text("mine")
+        os.utime(place, (0, 0))
+    keep = shelf.Shelf(FOLDER, 1000, print)
+    for k in range(6):
+        keep.put(FOLDER / PART / f"{k}.kept", str(k), bytes(300))
+    check(0 < len(kept_files()) < 6 and not set(kept_files()) & set(theirs), f"{kept_files()}")
+    shelf.clear(FOLDER)
+    check(all(place.read_text() == "mine" for place in theirs) and not kept_files(), f"{list(FOLDER.rglob('*'))}")
+
+
+def test_the_cap_is_not_looked_after_at_each_part():
+    shutil.rmtree(FOLDER, ignore_errors=True)
+    keep = shelf.Shelf(FOLDER, 100_000, print)
+    keep.last.append(FOLDER / PART / "0.kept")  # without it nothing can be shown
+    with mock.patch.object(shelf, "files", wraps=shelf.files) as looked:
+        for k in range(600):
+            keep.put(FOLDER / PART / f"{k}.kept", str(k), bytes(1000))
+    held = sum(size for _, size, _ in shelf.files(FOLDER))
+    check(held <= 100_000 and (FOLDER / PART / "0.kept").exists(), f"{held}")
+    check(looked.call_count < 150, f"looked through {looked.call_count} times for 600 parts")
+
+
+def test_what_is_kept_shows_whatever_is_missing():
+    """Without a server more parts are missing in a row than it is asked for: what is kept behind them shows all the same."""
+    path, entries, _ = made("half.copc.laz", POINTS)
+    with keeping():
+        with server(path, "etag") as (address, _):
+            opened(address)
+        sizes = sorted(kept_files(), key=lambda place: place.stat().st_mtime_ns)
+        for place in sizes[-6:-1]:  # pages, the last but the very last
+            place.unlink()
+        opened(address)
+        said = " ".join(text for _, text in reports)
+        check("the cache does not hold it" in said, said)
+        check(stream_of().arrived >= len(entries) - 5, f"{stream_of().arrived} of {len(entries)} arrived")
 
 
 def test_button_says_what_it_frees():
