@@ -452,7 +452,9 @@ static void put_together(const struct pt_builder *builder)
         } else if (picture) {
             break;
         } else if (kernel == PT_KERNEL_focus && reads) {
-            leaves = 1 + plan->passes[end].refs[PT_BUF_focus_color].which;
+            const uint32_t left = plan->passes[end].refs[PT_BUF_focus_color].which;
+            if (first == builder->tail || left != PT_PLANE_COLOR_A) // a walk behind shading reads that plane: never in place
+                leaves = 1 + left;
             break;
         } else {
             first = end + 1;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Closed surface that a station looked through: taken back where free space is used, magenta where it is shown; equal on every
 // device, for any threads, and in regions; kept in saved clouds.
+#include "plan/plan.h"
 #include "scene/cloud.h"
 #include "scenes/support.h"
 
@@ -236,9 +237,55 @@ static void test_alike(void **state)
     free(scan.station);
 }
 
+// What is shown of free space comes behind shading; depth of field then may not be drawn over what the others still read.
+static void test_shown_out_of_focus(void **state)
+{
+    (void)state;
+    struct scan scan = make_scan();
+    patina_cloud *cloud = make_cloud(&scan, 1);
+    patina_settings settings = settings_of();
+    settings.antialias = PATINA_ANTIALIAS_LAYERS;
+    const patina_effects effects = {.struct_size = sizeof effects,
+                                    .edl_strength = 1.0f,
+                                    .fog_density = 0.5f,
+                                    .fog_end = 9.0f,
+                                    .focus_distance = 3.0f,
+                                    .focus_aperture = 0.05f};
+    const patina_cloud_style style = {
+        .struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .free_space = PATINA_FREE_SPACE_SHOW};
+    patina_scene *scene = scene_of(cloud, &style);
+    CHECK(patina_scene_set_effects(scene, &effects), scene);
+    const patina_camera camera = camera_at(0);
+    CHECK(patina_scene_set_camera(scene, &camera), scene);
+    CHECK(patina_scene_set_settings(scene, &settings), scene);
+    struct pt_plan plan;
+    assert_int_equal(pt_plan_create(scene, &plan), PATINA_OK);
+    for (uint32_t i = 0; i < plan.pass_count; i++)
+        assert_int_equal(plan.passes[i].leaves, 0);
+    pt_plan_destroy(&plan);
+    struct picture first = {0};
+    for (uint32_t threads = 1; threads < 40; threads += 6) {
+        patina_device *device = support_device_open("cpu", threads, 1);
+        struct picture picture = picture_render(device, scene, &camera, &settings);
+        patina_device_destroy(device);
+        if (!first.keys) {
+            first = picture;
+            continue;
+        }
+        picture_assert_identical(&picture, &first, 0, 0, "whatever the threads");
+        picture_free(&picture);
+    }
+    picture_free(&first);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+    free(scan.position);
+    free(scan.station);
+}
+
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_slit), cmocka_unit_test(test_alike)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_slit), cmocka_unit_test(test_alike),
+                                       cmocka_unit_test(test_shown_out_of_focus)};
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
