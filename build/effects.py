@@ -93,4 +93,8 @@ def parse(text: str) -> list[dict[str, Any]]:
             raise ValueError(f"effects.def: PATINA_EFFECT{kind} is not known")
     for effect, (option, taken) in zip(effects, options):
         _check(effect, option, taken)
+    words = 1 + sum(3 if field["kind"] in ("COLOR", "AXIS") else 1 for effect in effects for field in effect["fields"])  # and exact
+    if words % 2:
+        raise ValueError(f"effects.def: {words} words would leave padding behind the last effect, where callers compiled with fewer "
+                         "leave anything: give it one field more")
     return effects

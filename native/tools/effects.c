@@ -162,12 +162,12 @@ int tool_parse_effect(const char *name, const char *value, patina_effects *effec
 
 // ---- help ------------------------------------------------------------------------------------------------------------
 
-// edl_strength -> STRENGTH, fog_color -> R,G,B. Returns how many characters.
+// edl_strength -> STRENGTH, haze -> HAZE, fog_color -> R,G,B. Returns how many characters.
 static int print_name(FILE *out, const struct field *field)
 {
     if (field->kind == COLOR || field->kind == AXIS)
         return fprintf(out, "%s", field->kind == COLOR ? "R,G,B" : "X,Y,Z");
-    const char *name = strchr(field->name, '_') + 1;
+    const char *rest = strchr(field->name, '_'), *name = rest ? rest + 1 : field->name;
     for (const char *c = name; *c; c++)
         fputc(toupper((unsigned char)*c), out);
     return (int)strlen(name);

@@ -92,6 +92,9 @@ class Abi(unittest.TestCase):
             with self.assertRaises(ValueError) as said:
                 effects.parse(text.replace(old, new))
             self.assertTrue(str(said.exception).startswith(told), said.exception)
+        with self.assertRaises(ValueError) as said:
+            effects.parse(text + '\nPATINA_EFFECT_SWITCH(odd, PART, "odd", "Odd", "Odd")\n')
+        self.assertIn("padding", str(said.exception))
 
     def test_constants(self) -> None:
         self.assertEqual(abi.PASSES["COMBINED"], (0, 4))
