@@ -45,7 +45,7 @@ def steps(pieces: importers.Pieces, place: Path, scalar: str, offset: Corner, hi
             if piece is not None:
                 opacities = attributes.without_uncolored(None, piece.colors) if hide_uncolored else None
                 shown = shown or bool(opacities is None or opacities.any())
-                builder.add(piece.positions, piece.normals, piece.colors, opacities, None, _column(piece, scalar), _classes(piece), offset)
+                builder.add(piece.positions, piece.normals, piece.colors, opacities, None, column(piece, scalar), classes(piece), offset)
                 scans.add(piece.scalars)
             yield jobs.Pause()
         if not shown:  # colors that are black everywhere are none, and hide nobody
@@ -63,14 +63,14 @@ def steps(pieces: importers.Pieces, place: Path, scalar: str, offset: Corner, hi
         return scans.keep()
 
 
-def _column(piece: importers.PointFile, name: str) -> np.ndarray | None:
+def column(piece: importers.PointFile, name: str) -> np.ndarray | None:
     values = piece.scalars.get(name)
     return None if values is None else np.ascontiguousarray(values, np.float32).reshape(-1, 1)
 
 
-def _classes(piece: importers.PointFile) -> np.ndarray | None:
+def classes(piece: importers.PointFile) -> np.ndarray | None:
     name = next((name for name in attributes.CLASS_NAMES if name in piece.scalars), "")
-    values = _column(piece, name)
+    values = column(piece, name)
     return None if values is None else attributes.as_classes(values)
 
 

@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from .. import importers, jobs, native, preferences, streaming
 from ..importers import crs
@@ -184,7 +183,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
     seen_by = [points.scalars.get(name) for name in (analysis.SCAN, analysis.ROW, analysis.COLUMN)]
     scans, scan_of = scans_in(points.scalars)
-    discs = [_column(points, name) if points.splats else None for name in ("opacity", "radius")]
+    discs = [building.column(points, name) if points.splats else None for name in ("opacity", "radius")]
     for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
         del points.scalars[name]
     origin = source.origin or points.origin
@@ -194,7 +193,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     opacities = attributes.without_uncolored(discs[0], points.colors) if source.hide_uncolored else discs[0]
     with progress.part(1, parts).inner() as inner:
         task = native.Cloud.start(points.positions, points.normals, points.colors, opacities, inner, discs[1], origin=offset,
-                                  scalars=_column(points, source.scalar), classes=_classes(points))
+                                  scalars=building.column(points, source.scalar), classes=building.classes(points))
     yield task
     cloud = task.result()
     if source.analyzed:
@@ -342,17 +341,6 @@ def _let_go(path: Path) -> None:
     with contextlib.suppress(OSError):
         for ending in (path.suffix, ".json", SCAN_ENDING):
             path.with_suffix(ending).unlink(missing_ok=True)
-
-
-def _column(points: importers.PointFile, name: str) -> np.ndarray | None:
-    values = points.scalars.get(name)
-    return None if values is None else np.ascontiguousarray(values, np.float32).reshape(-1, 1)
-
-
-def _classes(points: importers.PointFile) -> np.ndarray | None:
-    found = next((name for name in attributes.CLASS_NAMES if name in points.scalars), "")
-    values = _column(points, found)
-    return None if values is None else attributes.as_classes(values)
 
 
 def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None, units: list[float] | None,
