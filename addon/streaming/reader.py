@@ -90,28 +90,38 @@ class Reader:
         while True:
             page = self._next()
             try:
-                try:
-                    self._unpack(page)
-                except OSError:
-                    raise
-                except Exception as error:  # of a reader: who waits for the page is told
-                    with self._change:
-                        self._done.discard(page)
-                    self._put(f"{page}.bad", f"page {page}: {type(error).__name__}: {error}".encode("utf-8", "replace"))
+                self._give(page)
             except OSError:  # the folder is gone: so is Blender
                 os._exit(1)
+
+    def _give(self, page: int) -> None:
+        try:
+            self._unpack(page)
+        except OSError:
+            raise
+        except Exception as error:  # of a reader: who waits for the page is told
+            self._lose(page, f"page {page}: {type(error).__name__}: {error}")
+
+    def _lose(self, page: int, why: str) -> None:
+        with self._change:
+            self._done.discard(page)
+        self._put(f"{page}.bad", why.encode("utf-8", "replace"))
 
     def _unpack(self, page: int) -> None:
         try:
             data = self._kind.fetch(self._tree, page, self._source)
         except SourceError as error:
             with self._change:
-                self._done.discard(page)
                 self._failures += 1
                 down = self._failures >= MOST_FAILURES and not self._source.keeps
-                self._queue = [] if down else self._queue
+                if down:
+                    self._done.discard(page)
+                    self._queue = []
             text = str(error) if isinstance(error, Resting) else f"page {page}: {error}"
-            self._put("down" if down else f"{page}.bad", text.encode("utf-8", "replace"))
+            if down:
+                self._put("down", text.encode("utf-8", "replace"))
+            else:
+                self._lose(page, text)
             return
         with self._change:
             self._failures = 0
@@ -120,9 +130,7 @@ class Reader:
             found = self._kind.columns(self._tree, page, records, self._scalar)
         except SourceError as error:
             self._source.forget(self._kind.key_of(self._tree, page))
-            with self._change:
-                self._done.discard(page)
-            self._put(f"{page}.bad", f"page {page}: {error}".encode("utf-8", "replace"))
+            self._lose(page, f"page {page}: {error}")
             return
         self._put(f"{page}.page", b"".join(found[name].tobytes() for name in ("positions", "colors", "scalars", "classes")
                                            if name in found))
