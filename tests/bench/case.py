@@ -21,6 +21,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2] / "addon"), str(Path(__f
 import machine  # noqa: E402
 import metrics  # noqa: E402
 import stage as stages  # noqa: E402
+from looks import CUES  # noqa: E402
 
 import native  # noqa: E402  the add-on's binding, the only one there is
 
@@ -78,16 +79,6 @@ MODES = {
     "lines 16": Mode(lines={"width": 16.0}),
 }
 
-# Depth cues and means of drawing, by themselves; the torus lies 3.6 from the camera.
-CUES = {
-    "eye-dome lighting": {"edl_strength": 1.0},
-    "ambient obscurance": {"obscurance_strength": 1.0},
-    "toon bands": {"toon_bands": 3, "toon_softness": 0.15},
-    "hatching": {"hatch_levels": 2},
-    "fog": {"fog_start": 2.5, "fog_end": 5.0, "fog_density": 1.0},
-    "depth of field": {"focus_distance": 3.2, "focus_aperture": 0.05},
-    "paper": {"paper_color": (0.93, 0.88, 0.78), "paper_grain": 0.15},
-}
 MODES |= {name: Mode(effects=effects) for name, effects in CUES.items()}
 
 

@@ -23,7 +23,8 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent), str(HERE.parent / "scenes"), str(HERE.parents[1] / "addon")]
 
-from pairs import CUES, case, interval  # noqa: E402
+from looks import CUES  # noqa: E402
+from pairs import case, interval  # noqa: E402
 
 CLIP = {"shape": "CLIP_SHAPE.PLANE", "world_from_clip": [1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0.45, 0, 0, 0, 1.0]}
 TINTED = CLIP | {"tint": [1.0, 0.2, 0.1], "tint_strength": 0.8, "tint_width": 0.5}

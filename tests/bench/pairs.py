@@ -23,14 +23,9 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scenes"))
 
 import compare_builds  # noqa: E402
+from looks import CUES  # noqa: E402
 
 SUN = {"type": "LIGHT_TYPE.SUN", "power": 3.0, "direction": [0.4, 0.5, -1.0]}
-CUES: dict[str, dict[str, Any]] = {
-    "eye-dome lighting": {"edl_strength": 1.0}, "ambient obscurance": {"obscurance_strength": 1.0},
-    "toon bands": {"toon_bands": 3, "toon_softness": 0.15}, "hatching": {"hatch_levels": 2},
-    "fog": {"fog_start": 2.5, "fog_end": 5.0, "fog_density": 1.0}, "depth of field": {"focus_distance": 3.2, "focus_aperture": 0.05},
-    "paper": {"paper_color": [0.93, 0.88, 0.78], "paper_grain": 0.15},
-}
 POINTWISE = ("toon bands", "hatching", "fog", "paper")
 MODES: dict[str, dict[str, Any]] = {
     "surface": {}, "as in the paper": {"settings": {"quality": "QUALITY.PAPER", "fill": "FILL.PAPER"}},
