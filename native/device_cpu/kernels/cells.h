@@ -10,16 +10,18 @@
 #include "device_cpu/points.h"
 
 enum {
-    PT_CELL_BLOCK = 256,     // points
-    PT_BAND_CELLS = 1 << 13, // about
-    PT_BAND_LEAST = 8,
-    PT_BAND_MOST = 64, // rows
+    PT_CELL_BLOCK = 256, // points
+    PT_BAND_CELLS =
+        1 << 15,       // at most: a megabyte of narrow sums. Of 1 << 13 a picture of 1.3 million points takes a seventh longer
+    PT_BAND_LEAST = 8, // rows
+    PT_BANDS_EACH = 2, // a thread, at least
 };
 
 typedef int64_t pt_vl_eight __attribute__((vector_size(64), aligned(8), may_alias));
 
 struct pt_cell_band {
     uint32_t first, end; // rows of the plane
+    int wide;            // 0: sums are of 32 bits, in the front half of their memory
     int64_t *sums;       // PT_SUMS a cell
 };
 
@@ -38,8 +40,9 @@ struct pt_cells {
     const struct chunk_view *chunks;
     uint32_t chunk_count;
     // A block goes into its band's sums; means of PT_LANES cells from the one at `at` on, `count` of which there are, come out of them.
-    void (*add)(const struct pt_cells *cells, const struct pt_cell_band *band, const struct pt_cell_block *block);
+    void (*add)(const struct pt_cells *cells, struct pt_cell_band *band, const struct pt_cell_block *block);
     void (*save)(const struct pt_cells *cells, const struct pt_cell_band *band, size_t at, uint32_t count);
+    int narrow;    // 1: bands begin with 32 bits, and `add` widens them before they are too few
     uint32_t rows; // of a band
     char *memory;  // per thread
     size_t thread_bytes;
@@ -105,6 +108,19 @@ static inline int pt_cells_may_reach(const struct view_args *view, const struct 
     return chunk->row_first < band->end && band->first < end;
 }
 
+// From 32 bits to 64, in their own memory.
+static inline void pt_cells_widen(const struct pt_cells *cells, struct pt_cell_band *band)
+{
+    const int32_t *narrow = (const int32_t *)(const void *)band->sums;
+    for (size_t i = (size_t)(band->end - band->first) * cells->view->width * PT_SUMS; i--;) {
+        int32_t sum;
+        memcpy(&sum, narrow + i, sizeof sum);
+        const int64_t whole = sum;
+        memcpy(band->sums + i, &whole, sizeof whole);
+    }
+    band->wide = 1;
+}
+
 static void pt_cells_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct pt_cells *cells = context;
@@ -115,7 +131,9 @@ static void pt_cells_bands(void *context, uint32_t begin, uint32_t end, uint32_t
     for (uint32_t b = begin; b < end && !pt_cpu_cancelled(cells->call); b++) {
         band.first = rect[1] + b * cells->rows;
         band.end = band.first + cells->rows < rect[3] ? band.first + cells->rows : rect[3];
-        memset(band.sums, 0, (size_t)(band.end - band.first) * view->width * PT_SUMS * sizeof *band.sums);
+        band.wide = !cells->narrow;
+        memset(band.sums, 0,
+               (size_t)(band.end - band.first) * view->width * PT_SUMS * (band.wide ? sizeof(int64_t) : sizeof(int32_t)));
         for (uint32_t c = 0; c < cells->chunk_count; c++) {
             const struct chunk_view *chunk = &cells->chunks[c];
             for (uint32_t first = 0; pt_cells_may_reach(view, chunk, &band) && first < chunk->count; first += PT_CELL_BLOCK) {
@@ -136,9 +154,11 @@ static int pt_cells_run(struct pt_cells *cells)
     const struct view_args *view = cells->view;
     if (view->rect[0] >= view->rect[2] || view->rect[1] >= view->rect[3])
         return PATINA_OK;
-    const uint32_t fit = PT_BAND_CELLS / view->width;
-    cells->rows = fit < PT_BAND_LEAST ? PT_BAND_LEAST : fit < PT_BAND_MOST ? fit : PT_BAND_MOST;
-    cells->thread_bytes = ((size_t)cells->rows * view->width * PT_SUMS * sizeof(int64_t) + 63) / 64 * 64;
+    const uint32_t fit = PT_BAND_CELLS / view->width, bands = PT_BANDS_EACH * pt_pool_threads(cells->call->pool);
+    const uint32_t even = (view->rect[3] - view->rect[1] + bands - 1) / bands, rows = fit < even ? fit : even;
+    cells->rows = rows < PT_BAND_LEAST ? PT_BAND_LEAST
+                                       : rows; // points near an edge are projected twice: as few bands as may be
+    cells->thread_bytes = (((size_t)cells->rows * view->width + PT_LANES) * PT_SUMS * sizeof(int64_t) + 63) / 64 * 64;
     cells->memory = pt_cpu_scratch(cells->call, 0, pt_pool_threads(cells->call->pool) * cells->thread_bytes);
     if (!cells->memory)
         return PATINA_ERROR_MEMORY;

@@ -19,7 +19,7 @@ static vf off_plane(const struct view_args *view, vf x, vf y, vf z, vf behind, c
     return (n[0] * across + n[1] * up) - n[2] * behind;
 }
 
-static void add(const struct pt_cells *cells, const struct pt_cell_band *band, const struct pt_cell_block *block)
+static void add(const struct pt_cells *cells, struct pt_cell_band *band, const struct pt_cell_block *block)
 {
     const struct differ_args *args = cells->call->arguments;
     const struct view_args *view = cells->view;

@@ -55,6 +55,7 @@ static const int triples[4][3] = {{0, 1, 2}, {1, 3, 2}, {0, 1, 3}, {0, 3, 2}};
 struct cell_row {       // of cells, number PAD + column
     int32_t y, divided; // whose; the same where `quads` holds
     float *x, *y_of, *z, *factor;
+    float *least; // of finer ones: the z of the nearest, of a cell, the one before and the one behind
     uint32_t *there, *quads;
 };
 
@@ -199,6 +200,19 @@ static void read_cells(const struct walk *walk, struct cell_row *row, int32_t y,
 }
 
 static vm is_there(const uint32_t *there) { return vi_eq(vi_load(there), vi_set(1)); }
+
+// The nearest of three in a row.
+static void find_nearest(struct cell_row *row, int32_t left, int32_t right)
+{
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    for (int32_t x = left + PAD; x + 2 < right + PAD; x += PT_LANES) {
+        vf least = empty;
+        for (int k = 0; k < 3; k++)
+            least = vf_min(vf_select(is_there(row->there + x + k), vf_load(row->z + x + k), empty), least);
+        vf_store(row->least + x + 1, least);
+    }
+}
+
 static vi bit_where(vm some, uint32_t bit) { return vi_select(some, vi_set(bit), vi_set(0)); }
 
 // How PT_LANES faces are divided, from their corners.
@@ -245,8 +259,11 @@ static void hold(const struct walk *walk, struct cell_row rows[3], int32_t cy, s
     const int32_t left = (int32_t)walk->column[rect[0]] - 1, right = (int32_t)walk->column[rect[2] - 1] + 2;
     for (int32_t k = 0; k < 3; k++) {
         around[k] = &rows[(uint32_t)(cy + 2 + k) % 3];
-        if (around[k]->y != cy - 1 + k)
-            read_cells(walk, around[k], cy - 1 + k, left, right);
+        if (around[k]->y == cy - 1 + k)
+            continue;
+        read_cells(walk, around[k], cy - 1 + k, left, right);
+        if (walk->args->pass & PT_RANGE_FINE)
+            find_nearest(around[k], left, right);
     }
     for (int k = 0; k < 2; k++)
         if (around[k]->divided != around[k]->y)
@@ -496,21 +513,49 @@ static vm unsharp(const struct walk *walk, const struct found *best, vi cell, co
     return vm_or(vm_or(grazed, edge), vm_or(many, best->loose));
 }
 
-// Of the second: what may take the place of what is there, whose marks are taken away.
-static vm replaces(const struct walk *walk, size_t at, const struct found *best, vm lanes)
+// Of the second: what pixels show of the first one.
+struct before {
+    vm own, marked; // own: of the instance; marked: not sharp
+    vf z, step;     // where they are not its own, of no pixel
+};
+
+static struct before look_before(const struct walk *walk, size_t at, vm lanes)
 {
     const struct magnify_args *args = walk->args;
     const uint64_t *keys = (const uint64_t *)PT_DATA(walk->call, magnify, keys) + at;
+    const vf z = vi_float(vi_load_z(keys)), marks = vf_load((const float *)PT_DATA(walk->call, magnify, away) + at);
+    struct before before;
+    before.own = vm_and(vm_and(lanes, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)))),
+                        vi_lt_unsigned(vi_sub(vi_load_id(keys), vi_set(args->id_base)), vi_set(args->id_count)));
+    before.marked = vm_and(before.own, vf_lt(marks, vf_zero()));
+    before.z = vf_select(before.own, z, vf_set(1.0f));
+    before.step = pt_range_step(walk->cells, args->gamma, args->gamma_cells, before.z);
+    return before;
+}
+
+// Whether no face of PT_LANES pixels of a row changes anything: where nothing is marked, and all cells around lie no more than a step before
+// what is there. Of scans in two passes that is so for seven of ten that show something.
+static int is_settled(const struct walk *walk, struct cell_row *const rows[3], uint32_t x, uint32_t y, vm lanes)
+{
+    const struct before before = look_before(walk, (size_t)y * walk->args->view.width + x, lanes);
+    if (vm_bits(before.marked))
+        return 0;
+    const vi first = vi_set(walk->column[x]), at = vi_select(lanes, vi_sub(vi_load(walk->column + x), first), vi_set(0));
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), least = vf_select(before.own, before.z - before.step, empty);
+    vf nearest = empty;
+    for (int k = 0; k < 3; k++)
+        nearest = vf_min(vf_gather(rows[k]->least + PAD + walk->column[x], at, vm_first(PT_LANES)), nearest);
+    return !vm_bits(vm_and(lanes, vf_lt(nearest, least)));
+}
+
+// What may take the place of what is there, whose marks are taken away.
+static vm replaces(const struct walk *walk, size_t at, const struct found *best, vm lanes)
+{
     float *away = (float *)PT_DATA(walk->call, magnify, away) + at;
-    const vf z = vi_float(vi_load_z(keys)), zero = vf_zero(), marks = vf_load(away);
-    const vm own = vm_and(vm_and(lanes, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)))),
-                          vi_lt_unsigned(vi_sub(vi_load_id(keys), vi_set(args->id_base)), vi_set(args->id_count)));
-    const vm marked = vm_and(own, vf_lt(marks, zero));
-    vf_store_where(away, vf_set(-1.0f) - marks, marked);
-    const vf depth = vf_select(own, z, vf_set(1.0f));
-    const vf step = pt_range_step(walk->cells, args->gamma, args->gamma_cells, depth);
-    const vm nearer = vf_lt(best->z, depth - step), near = vf_le(best->z, depth + step);
-    return vm_and(best->some, vm_or(vm_not(own), vm_or(nearer, vm_and(marked, near))));
+    const struct before before = look_before(walk, at, lanes);
+    vf_store_where(away, vf_set(-1.0f) - vf_load(away), before.marked);
+    const vm nearer = vf_lt(best->z, before.z - before.step), near = vf_le(best->z, before.z + before.step);
+    return vm_and(best->some, vm_or(vm_not(before.own), vm_or(nearer, vm_and(before.marked, near))));
 }
 
 static void show(const struct walk *walk, uint32_t x, uint32_t y, uint32_t cy, float up, const struct found *best, vm lanes)
@@ -583,9 +628,16 @@ static void magnify_block(const struct walk *walk, struct cell_row *const rows[3
     const struct magnify_args *args = walk->args;
     const uint32_t count = pt_lanes_left(x, args->view.rect[2]);
     const vm lanes = vm_first(count);
+    const int fine = (args->pass & PT_RANGE_FINE) != 0;
     struct corners corners;
+    while (fine && y < end && is_settled(walk, rows, x, y, lanes))
+        y++;
+    if (y == end)
+        return;
     const int near = look_around(walk, rows, x, count, &corners);
-    for (; y < end && (near || args->pass & PT_RANGE_FINE); y++) {
+    for (; y < end && (near || fine); y++) {
+        if (fine && is_settled(walk, rows, x, y, lanes))
+            continue;
         const float py = row_of(walk, y), up = py - floorf(py);
         const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
         struct found best;
@@ -599,13 +651,13 @@ static void magnify_block(const struct walk *walk, struct cell_row *const rows[3
         best.some = vm_and(lanes, vf_lt(best.z, empty));
         best.loose = vm_not(best.some);
         if (near && vm_bits(vm_and(lanes, best.loose))) {
-            if (!(args->pass & PT_RANGE_FINE))
+            if (!fine)
                 take_places(walk, &corners, lanes, &best);
             const vm open = vm_and(lanes, vm_not(best.some));
             for (int k = 0; k < QUADS && corners.all & LOOSE && vm_bits(open); k++)
                 take_loose(walk, &corners, k % 2 + 3 * (k / 2), open, &best);
         }
-        if (vm_bits(best.some) || args->pass & PT_RANGE_FINE)
+        if (vm_bits(best.some) || fine)
             show(walk, x, y, cy, up, &best, lanes);
     }
 }
@@ -616,13 +668,14 @@ static void magnify_rows(void *context, uint32_t begin, uint32_t end, uint32_t t
     const uint32_t *rect = walk->args->view.rect;
     float *memory = (float *)(void *)(walk->memory + thread * walk->thread_bytes);
     struct cell_row rows[3], *around[3];
-    for (int k = 0; k < 3; k++, memory += 6 * walk->row_values)
+    for (int k = 0; k < 3; k++, memory += 7 * walk->row_values)
         rows[k] = (struct cell_row){.y = INT32_MIN,
                                     .divided = INT32_MIN,
                                     .x = memory,
                                     .y_of = memory + walk->row_values,
                                     .z = memory + 2 * walk->row_values,
                                     .factor = memory + 3 * walk->row_values,
+                                    .least = memory + 6 * walk->row_values,
                                     .there = (uint32_t *)(void *)(memory + 4 * walk->row_values),
                                     .quads = (uint32_t *)(void *)(memory + 5 * walk->row_values)};
     for (uint32_t y = rect[1] + begin, last; y < rect[1] + end && !pt_cpu_cancelled(walk->call); y = last) {
@@ -658,7 +711,7 @@ int PT_KERNEL_ENTRY(magnify)(const struct pt_cpu_call *call)
         return PATINA_OK;
     const size_t row = ((size_t)args->view.width + 2 * PT_LANES + 15) / 16 * 16;
     walk.row_values = ((size_t)args->cells.width + 2 * PAD + 3 * PT_LANES + 15) / 16 * 16;
-    walk.thread_bytes = 3 * 6 * walk.row_values * sizeof(float);
+    walk.thread_bytes = 3 * 7 * walk.row_values * sizeof(float);
     char *memory = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * walk.thread_bytes + 2 * row * 4);
     if (!memory)
         return PATINA_ERROR_MEMORY;

@@ -3,21 +3,51 @@
 #include "device_cpu/kernels/cells.h"
 #include "shared/ranges.h"
 
-typedef float vf_four __attribute__((vector_size(16), aligned(4), may_alias));
+#include <math.h>
+
 typedef int32_t vi_four __attribute__((vector_size(16), aligned(4), may_alias));
 typedef int64_t vl_four __attribute__((vector_size(32), aligned(8), may_alias));
 
 // Of a cell: weight, place across and up, share of the depth, colour 3, opacity.
 
+// Sums of 32 bits are widened from this weight on: a block more does not fill them, and no other sum of a cell is greater.
+#define FILLED (1 << 30)
+
+// Terms of the lanes that `left` names go to the sums of their cells, which begin at `first`.
+static void put_wide(int64_t *sums, const uint32_t *cell, size_t first, uint32_t left, const int32_t terms[2][PT_LANES][4])
+{
+    for (; left; left &= left - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(left);
+        vl_four *own = (vl_four *)(void *)(sums + PT_SUMS * (cell[lane] - first));
+        for (int k = 0; k < 2; k++)
+            own[k] += __builtin_convertvector(*(const vi_four *)(const void *)terms[k][lane], vl_four);
+    }
+}
+
+// The greatest bits of the weights that have come about.
+static int32_t put_narrow(int32_t *sums, const uint32_t *cell, size_t first, uint32_t left, const int32_t terms[2][PT_LANES][4])
+{
+    int32_t bits = 0;
+    for (; left; left &= left - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(left);
+        vi_four *own = (vi_four *)(void *)(sums + PT_SUMS * (cell[lane] - first));
+        for (int k = 0; k < 2; k++)
+            own[k] += *(const vi_four *)(const void *)terms[k][lane];
+        bits |= own[0][0];
+    }
+    return bits;
+}
+
 // To the sums of their cells.
-static void add(const struct pt_cells *cells, const struct pt_cell_band *band, const struct pt_cell_block *block)
+static void add(const struct pt_cells *cells, struct pt_cell_band *band, const struct pt_cell_block *block)
 {
     const struct merge_args *args = cells->call->arguments;
     const struct view_args *view = &args->view;
     const uint64_t *keys = PT_DATA(cells->call, merge, keys);
     const void *colors = PT_DATA(cells->call, merge, colors), *opacities = PT_DATA(cells->call, merge, opacities);
     const vf zero = vf_zero(), one = vf_set(1.0f), scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
-    float terms[2][PT_LANES][4];
+    const size_t origin = (size_t)band->first * view->width;
+    int32_t terms[2][PT_LANES][4], filled = 0;
     for (uint32_t i = 0; i < block->count; i += PT_LANES) {
         const vm lanes = vm_first(pt_lanes_left(i, block->count));
         const vi at = vi_load(block->cell + i), id = vi_load(block->id + i);
@@ -34,18 +64,30 @@ static void add(const struct pt_cells *cells, const struct pt_cell_band *band, c
         color[3] = pt_opacity(&args->instance, colors, opacities, id, id, some) * weight;
         for (int k = 0; k < 3; k++)
             color[k] = vf_max(vf_min(color[k], most), zero - most) * color[3];
-        vf_store4(terms[0][0], place, PT_ALL);
-        vf_store4(terms[1][0], color, PT_ALL);
-        for (uint32_t left = vm_bits(some); left; left &= left - 1) {
-            const uint32_t lane = (uint32_t)__builtin_ctz(left);
-            const size_t cell = block->cell[i + lane] - (size_t)band->first * view->width;
-            vl_four *sums = (vl_four *)(void *)(band->sums + PT_SUMS * cell);
-            for (int k = 0; k < 2; k++) {
-                const vi_four whole = __builtin_convertvector(*(const vf_four *)(const void *)terms[k][lane], vi_four);
-                sums[k] += __builtin_convertvector(whole, vl_four);
-            }
+        for (int k = 0; k < 4; k++) {
+            place[k] = vi_float(vf_int(place[k]));
+            color[k] = vi_float(vf_int(color[k]));
         }
+        vf_store4((float *)(void *)terms[0][0], place, PT_ALL);
+        vf_store4((float *)(void *)terms[1][0], color, PT_ALL);
+        if (band->wide)
+            put_wide(band->sums, block->cell + i, origin, vm_bits(some), (const int32_t(*)[PT_LANES][4])terms);
+        else
+            filled |= put_narrow((int32_t *)(void *)band->sums, block->cell + i, origin, vm_bits(some),
+                                 (const int32_t(*)[PT_LANES][4])terms);
     }
+    if (filled >= FILLED)
+        pt_cells_widen(cells, band);
+}
+
+// Whether no point's term is greater than its weight.
+static int are_dim(const struct instance_args *instance)
+{
+    const float *color = instance->color;
+    if (instance->color_format == 1)
+        return instance->opacity <= 1.0f;
+    return instance->color_format == 0 && instance->opacity <= 1.0f && fabsf(color[0]) <= 1.0f && fabsf(color[1]) <= 1.0f &&
+           fabsf(color[2]) <= 1.0f;
 }
 
 // The sums of PT_LANES cells, of which `count` there are. Most fit 32 bits.
@@ -90,7 +132,11 @@ static void save(const struct pt_cells *cells, const struct pt_cell_band *band, 
         vf_store4(merged_of, color, vm_bits(lanes));
         return;
     }
-    take(from, count, sums);
+    if (band->wide)
+        take(from, count, sums);
+    else
+        pt_take_sums((const int32_t *)(const void *)band->sums + PT_SUMS * (at - (size_t)band->first * view->width), NULL,
+                     lanes, sums);
     const vf nearest = vf_select(some, z, one), weight = vf_max(sums[0], one), inverse = vf_rcp(weight);
     const vf reach = pt_cell_reach(view, pt_range_gamma(view, args->gamma, args->gamma_cells, nearest), nearest);
     place[0] = sums[1] * inverse;
@@ -116,6 +162,7 @@ int PT_KERNEL_ENTRY(merge)(const struct pt_cpu_call *call)
                              .drawn = args->sifted ? PT_DATA(call, merge, drawn) : NULL,
                              .chunks = PT_DATA(call, merge, chunks),
                              .chunk_count = (uint32_t)(call->buffers[PT_BUF_merge_chunks]->size / sizeof(struct chunk_view)),
+                             .narrow = are_dim(&args->instance),
                              .add = add,
                              .save = save};
     return pt_cells_run(&cells);
