@@ -259,6 +259,72 @@ def test_range_images():
     check(drawn(render()), "clamped")
 
 
+def ptx_scan(place, columns, rows, cells=None, turn="1 0 0 0\n0 1 0 0\n0 0 1 0\n", wall=5.0):
+    """One scan: a wall across y, from -1 to 1, cells 0.125 apart of which one in a corner has no return. cells: how many are there."""
+    lines = [f"{-1 + 0.125 * u:g} {wall} {-1 + 0.125 * v:g} 0.5" for u in range(columns) for v in range(rows)]
+    lines[0] = "0 0 0 0.5"
+    x, y, z = place
+    return f"{columns}\n{rows}\n{x} {y} {z}\n1 0 0\n0 1 0\n0 0 1\n{turn}{x} {y} {z} 1\n" + "\n".join(lines[:cells]) + "\n"
+
+
+def test_ptx_is_range_images():
+    """Two scans, each with its grid, are one object with the scans as an attribute and stations as empties; it renders as range images,
+    whose normals need no analysis, linked too; each scan is hidden, and left out by its direction."""
+    path = text_file("grids.ptx", ptx_scan((0, 0, 0), 17, 17) + ptx_scan((1, -1, 0), 13, 17, wall=6.0625))
+    for link in (False, True):
+        scene = new_scene(64, 64)
+        scene.camera.rotation_euler.x, scene.camera.data.type, scene.camera.data.ortho_scale = np.pi / 2, 'ORTHO', 3.5
+        bpy.ops.import_scene.patina_points(filepath=str(path), link=link)
+        obj, = (item for item in bpy.data.objects if item.type == 'MESH')
+        known, _ = told_of(obj)
+        check([(scan.grid, scan.count) for scan in known] == [((17, 17), 288), ((13, 17), 220)], f"{known}")
+        check_close([scan.interval for scan in known], [0.125, 0.125], 0.01, "intervals")
+        check(all(scan.direction[1] > 0.9 for scan in known), f"{known}")
+        empties = sorted((item for item in bpy.data.objects if item.type == 'EMPTY'), key=lambda item: item["patina_station"])
+        check([item.parent for item in empties] == [obj, obj], f"{empties}")
+        bpy.context.view_layer.update()
+        check_close([item.matrix_world.translation for item in empties], [(0, 0, 0), (1, -1, 0)], 1e-5, "stations")
+        if not link:
+            scan = np.zeros(len(obj.data.vertices), np.int32)
+            obj.data.attributes["scan"].data.foreach_get("value", scan)
+            check(np.bincount(scan).tolist() == [288, 220], f"{np.bincount(scan)}")
+        bpy.context.view_layer.objects.active = obj
+        bpy.ops.object.patina_scans_list()
+        obj.patina.ranges.use = True
+        picture = render()
+        shown = picture["Combined"][..., 3] > 0
+        check(shown.sum() > 1300 and shown[32, 20:50].all(), f"{shown.sum()}: no pixel of the walls is open")
+        first, second = obj.patina.points.scans
+        first.hide = True
+        alone = len(drawn(render()))
+        check(0.55 * shown.sum() < alone < 0.95 * shown.sum(), f"{alone} of {shown.sum()}: the narrower one alone")
+        first.hide, obj.patina.ranges.use_cull = False, True
+        check(len(drawn(render())) == shown.sum(), "both looked as the view does")
+        scene.camera.location.y, scene.camera.rotation_euler.z = 12.0, np.pi
+        check(not drawn(render()), "from behind both are culled")
+
+
+def test_bad_scans_of_ptx():
+    """A matrix that is no rotation, a scan of no points, of one, and one that ends before its grid does are named, and the others shown."""
+    from patina import importers
+    from patina.importers import scans
+    bent = "1 0 0 0\n0 3 0 0\n0 0 0 0\n"
+    lone = ptx_scan((0, 0, 0), 1, 2)
+    path = text_file("bad.ptx", ptx_scan((0, 0, 0), 17, 17) + ptx_scan((3, 0, 0), 4, 4, turn=bent) + ptx_scan((4, 0, 0), 1, 1) + lone +
+                     ptx_scan((0, 0, 0), 17, 17, cells=200))
+    points = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+    said = "\n".join(points.warnings)
+    for words in ("scan 1 is left out: its matrix is none of a pose", "scan 2 has no points", "scan 3 has one point",
+                  "scan 4 ends 89 cells before its grid of 17 x 17 does"):
+        check(words in said, said)
+    check([scan.count for scan in scans.unpacked(points.notes["scans"])] == [288, 0, 0, 1, 199], f"{points.notes['scans']}")
+    scene = new_scene(64, 64)
+    scene.camera.rotation_euler.x, scene.camera.data.type, scene.camera.data.ortho_scale = np.pi / 2, 'ORTHO', 3.5
+    obj, = import_ply(path)
+    obj.patina.ranges.use = True
+    check(len(drawn(render())) > 1200, "the good ones are shown")
+
+
 def told_of(obj):
     from patina.importers import scans
     return scans.unpacked(obj.data.get("patina_scans")), np.array(obj.data.get("patina_scanners", [])).reshape(-1, 3)

@@ -180,6 +180,31 @@ static void overflow(struct harness *h)
     run(h, &s, TOL_UNSURE_HARD);
 }
 
+// Of colours up to white: so many points in a cell that 32 bits, in which the processor begins, are too few for their weights.
+static void crowd(struct harness *h)
+{
+    static const uint32_t many[] = {4096, 4096, 4096, 4096, 100};
+    for (uint32_t format = 0; format < 2; format++) {
+        struct rng rng = {9 + format};
+        struct setup s = look_at(h, &rng, 2, 2, 1, 2.0, many, 5, format);
+        struct cloud *cloud = &s.scene.clouds[0];
+        double most = 0.0;
+        s.args.instance.color[2] = 1.0f;
+        s.args.gamma = 1000.0f;
+        for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+            cloud->chunks[c].cull = 0;
+            for (uint32_t k = 0; k < cloud->chunks[c].count; k++)
+                for (int axis = 0; axis < 3; axis++)
+                    *points_coordinate(cloud, c, k, axis) *= 0.05f;
+        }
+        const struct cells cells = run(h, &s, TOL_UNSURE_HARD);
+        for (size_t p = 0; p < 4; p++)
+            most = fmax(most, (double)cells.place[4 * p + 3]);
+        if (!(most > 8192.0)) // 2^31 in all
+            harness_fail(h, "place", 0, 0, "%.9g points at most in a cell", most);
+    }
+}
+
 // What is sifted out adds nothing: every other slot, all of which are red.
 static void sifted(struct harness *h)
 {
@@ -255,6 +280,7 @@ int main(int argc, char **argv)
         {"random points, orthographic", orthographic, 0},
         {"gamma of nothing and of anything", gammas, 0},
         {"sums beyond 32 bits", overflow, 0},
+        {"weights beyond 32 bits", crowd, 0},
         {"what is sifted out", sifted, 0},
         {"plane sizes", plane_sizes, 0},
     };
