@@ -86,10 +86,12 @@ def _buffer(words: list[str], listing: Listing) -> Buffer:
         unit = word[5:] if word.startswith("soft:") else word
         if word == "block":
             buffer.block = True
+        elif word == "-" and len(words) == 5:
+            pass
         elif unit in listing.units and buffer.unit < 0:
             buffer.unit, buffer.soft = list(listing.units).index(unit), unit != word
         else:
-            raise ValueError(f"{word} is neither block nor a unit")
+            raise ValueError(f"{word} is neither block nor a unit, nor - alone")
     return buffer
 
 
@@ -167,6 +169,8 @@ def parse(text: str) -> Listing:
         _number(kernel)
         if kernel.domain == "tiles" and not any(b.unit == list(listing.units).index("key") for b in kernel.buffers):
             raise ValueError(f"{kernel.name} visits tiles, and reads no keys as a texture that tell which")
+        if kernel.domain == "bins" and not any(b.formats == ["bins"] for b in kernel.buffers):
+            raise ValueError(f"{kernel.name} reduces tiles, and has no buffer of bins")
         chunks = [i for i, b in enumerate(kernel.buffers) if b.formats == ["chunk"]]
         if chunks and "position" not in kernel.buffers[chunks[0] + 1].formats:
             raise ValueError(f"{kernel.name}: positions follow chunks")

@@ -340,7 +340,7 @@ size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, ch
         leave_clouds(scene);
         return 0;
     }
-    pt_plan_share_planes(&plan, pt_passes_together, frame->device, frame->planes.apart); // without memory it stays untold
+    pt_frame_share_planes(frame, &plan); // without memory it stays untold
     plan.mapped_cap = pt_pager_cap(frame->device, scene, &plan.round_bytes);
     plan.round_bytes = plan.mapped_cap ? plan.round_bytes : 0;
     size_t length = pt_plan_text(scene, &plan, buffer, size);

@@ -23,7 +23,7 @@ struct pt_cpu_call {
     struct pt_cpu_scratch *scratch; // [PT_CPU_SCRATCHES], kept between calls
 };
 
-enum { PT_CPU_BINS = 2, PT_CPU_SCRATCHES }; // PT_CPU_BINS: what splat leaves to blend
+enum { PT_CPU_SCRATCHES = 2 };
 
 // Scratch memory of at least `size` bytes, contents undefined, grown if need be. NULL when memory lacks.
 void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size);
@@ -59,7 +59,7 @@ static inline uint32_t pt_chunk_instance(const uint32_t *begins, uint32_t chunk,
     return near;
 }
 
-// A kernel returns PATINA_OK, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED.
+// A kernel returns PATINA_OK, PATINA_ERROR_MEMORY, PATINA_ERROR_CANCELLED or PT_MORE_ROOM; from one run to the next it keeps nothing.
 typedef int pt_cpu_kernel(const struct pt_cpu_call *call);
 
 // Kernels that run as one: see device.h, run_tail.

@@ -199,6 +199,7 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *isa, struct
     cpu->isa = isas[chosen];
     cpu->pool = pool;
     cpu->base.memory_cap = desc->memory_cap;
+    cpu->base.bin_threads = pt_pool_threads(pool);
     cpu->base.info = (patina_device_info){.struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool)};
     snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", cpu->isa->name);
     pt_processor_name(cpu->base.info.description, sizeof cpu->base.info.description);

@@ -197,6 +197,8 @@ int pt_gl_soft(struct pt_gl_device *d, const struct pt_gl_work *work)
     const struct soft_args *args = work->arguments;
     const uint32_t *rect = args->view.rect;
     struct soft soft = {.work = work, .args = args, .model = args->model};
+    if (rect[0] >= rect[2] || rect[1] >= rect[3])
+        return PATINA_OK;
     soft.draw = (args->veils ? VEIL : DRAW) + soft.model;
     soft.columns = (rect[2] - rect[0] + PT_SOFT_TILE - 1) / PT_SOFT_TILE;
     soft.tiles = soft.columns * ((rect[3] - rect[1] + PT_SOFT_TILE - 1) / PT_SOFT_TILE);

@@ -3,6 +3,7 @@
 // with. What readers and the next render need has memory of its own.
 #include "passes.h"
 
+#include <math.h>
 #include <string.h>
 
 enum { NO_LIFE = 0 };
@@ -21,7 +22,7 @@ int pt_plane_is_kept(enum pt_plane which, uint32_t index)
 static void use(struct builder_of_lives *b, enum pt_plane which, uint32_t index)
 {
     struct pt_plan *plan = b->plan;
-    if (pt_plane_is_kept(which, index))
+    if (pt_plane_is_kept(which, index) || !pt_plan_plane_bytes(plan, which, index))
         return;
     if (b->of[which][index] == NO_LIFE) {
         plan->lives[plan->life_count++] = (struct pt_life){
@@ -46,7 +47,7 @@ static void use_passes(struct builder_of_lives *b, uint32_t first, uint32_t coun
     b->clock++;
 }
 
-static void use_step(struct builder_of_lives *b, struct pt_step *step, pt_together *together, const void *device)
+static void use_step(struct builder_of_lives *b, struct pt_step *step, const struct pt_abilities *abilities)
 {
     const struct pt_plan *plan = b->plan;
     step->when = b->clock;
@@ -60,7 +61,8 @@ static void use_step(struct builder_of_lives *b, struct pt_step *step, pt_togeth
         use(b, PT_PLANE_MESH_WORDS, 0);
     }
     for (uint32_t i = step->first; i < step->first + step->count;) {
-        const uint32_t some = together ? together(device, &plan->passes[i]) : 0, taken = some ? some : 1;
+        const uint32_t some = abilities->together ? abilities->together(abilities->device, &plan->passes[i]) : 0;
+        const uint32_t taken = some ? some : 1;
         use_passes(b, i, taken, taken > 1);
         i += taken;
     }
@@ -121,7 +123,29 @@ static uint64_t kept_bytes(const struct pt_plan *plan)
     return bytes;
 }
 
-int pt_plan_share_planes(struct pt_plan *plan, pt_together *together, const void *device, int apart)
+// No camera that moves a little is to ask for other memory: up to an eighth more.
+static uint64_t rounded_up(uint64_t count)
+{
+    uint64_t step = 1;
+    while (count / step >= 16)
+        step *= 2;
+    return (count + step - 1) / step * step;
+}
+
+void pt_plan_set_bins(struct pt_plan *plan, uint32_t threads, uint64_t had)
+{
+    const uint32_t bins = pt_bins_of(&plan->view);
+    plan->disc_bins = 0;
+    if (!threads || !pt_plan_draws(plan, PT_AS_DISCS))
+        return;
+    const double full = 1.25 * plan->disc_entries / PT_BIN_DISCS, begun = (double)threads * (bins + PT_BIN_SHARE);
+    const size_t most = (size_t)16 * UINT32_MAX; // what is wanted beyond is refused when it is asked for
+    size_t bytes = pt_bins_bytes(bins, threads, rounded_up((uint64_t)fmin(full + begun, 4e9)));
+    bytes = had > bytes && had / 4 < bytes ? (size_t)had : bytes;
+    plan->disc_bins = (uint32_t)(((bytes < most ? bytes : most) + 15) / 16);
+}
+
+int pt_plan_share_planes(struct pt_plan *plan, const struct pt_abilities *abilities, int apart)
 {
     enum { MOST_LIVES = PT_PLANE_COUNT * PT_SLOTS }; // one of each plane
     struct builder_of_lives b = {.plan = plan};
@@ -130,8 +154,9 @@ int pt_plan_share_planes(struct pt_plan *plan, pt_together *together, const void
     plan->slabs = pt_arena_take(&plan->arena, (MOST_LIVES + 1) * sizeof *plan->slabs);
     if (!b.of || !plan->lives || !plan->slabs)
         return PATINA_ERROR_MEMORY;
+    pt_plan_set_bins(plan, abilities->bin_threads, abilities->bins_had);
     for (uint32_t i = 0; i < plan->step_count; i++)
-        use_step(&b, &plan->steps[i], together, device);
+        use_step(&b, &plan->steps[i], abilities);
     share(plan, apart);
     for (uint32_t i = 0; i < plan->step_count; i++)
         if (plan->steps[i].of == PT_STEP_LIGHT)

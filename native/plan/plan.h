@@ -21,8 +21,8 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 // serve one layer after another. What a plane holds says kernels.def. No order here means anything.
 // X(name, format, size, slots, carried)
 //   size: WINDOW: the view's; LIGHTS: one of these for each light that casts shadows; CROP: the picture that callers read; TILES: of
-//         16 x 16 pixels of the window; RECORDS: no pixels, but plan->soft_records of them; BINS: as many as these need; CELLS: of the
-//         largest image buffer; VEILS: the view's, plan->veils for each pixel
+//         16 x 16 pixels of the window; RECORDS: no pixels, but plan->soft_records of them; BINS: as many as these need; DISCS:
+//         plan->disc_bins; CELLS: of the largest image buffer; VEILS: the view's, plan->veils for each pixel
 //   slots: ONE; LEVELS: coarser ones too; LAYERS: one each
 //   carried: from layer to layer
 #define PT_PLANES(X)                                                                                                           \
@@ -75,6 +75,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(SOURCE, f32, CROP, ONE, 0)                                                                                               \
     X(SHADOW, f32, CROP, ONE, 0)                                                                                               \
     X(LINES, f32, CROP, ONE, 0)                                                                                                \
+    X(DISC_BINS, bins, DISCS, ONE, 0)                                                                                          \
     X(SOFT_POINTS, record, RECORDS, ONE, 0)                                                                                    \
     X(SOFT_BINS, bins, BINS, ONE, 0)                                                                                           \
     X(SOFT_REACHED, f32, WINDOW, ONE, 0)                                                                                       \
@@ -101,6 +102,7 @@ enum pt_plane_size {
     PT_SIZE_TILES,
     PT_SIZE_RECORDS,
     PT_SIZE_BINS,
+    PT_SIZE_DISCS,
     PT_SIZE_CELLS,
     PT_SIZE_VEILS
 };
@@ -288,6 +290,8 @@ struct pt_plan {
     uint32_t soft_records; // room for the largest part
     float soft_depths[2];  // z that balls of the whole picture begin and end at
     uint32_t veils;        // of a light's map: slabs of depth that its soft points are counted in; 0: it is one of surfaces
+    double disc_entries;   // in bins of discs, as their sizes on screen let expect
+    uint32_t disc_bins;    // of 16 bytes: pt_plan_set_bins
     uint32_t discs_first, discs_count; // ids whose points are discs
     int sigmas;  // some points know how thick their surface is: d_eff follows it, and the span plane holds
     int reaches; // points know how far they spread: holes are closed no farther
@@ -388,9 +392,20 @@ int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane);
 
 // lifetimes.c. How many passes from one on a device runs as one: device.h, tail_length.
 typedef uint32_t pt_together(const void *device, const struct pt_pass *passes);
-// Finds plan->lives, and which of them share slabs; apart: none do, for all are to be looked at afterwards. together: NULL: every pass
-// runs alone. PATINA_ERROR_MEMORY, or 0.
-int pt_plan_share_planes(struct pt_plan *plan, pt_together *together, const void *device, int apart);
+// What planes depend on of a device.
+struct pt_abilities {
+    pt_together *together; // NULL: every pass runs alone
+    const void *device;    // of together
+    uint32_t bin_threads;  // device.h
+    uint64_t bins_had;     // bytes that the bins of discs came to in the picture before
+};
+// Finds plan->disc_bins, plan->lives, and which of them share slabs; apart: none do, for all are to be looked at afterwards.
+// PATINA_ERROR_MEMORY, or 0.
+int pt_plan_share_planes(struct pt_plan *plan, const struct pt_abilities *abilities, int apart);
+// The rule of the bins' room: a quarter more entries than are expected, for each thread a block of each tile that is not full, and those
+// that it took and did not come to, rounded up by an eighth at most; or what the picture before came to, where that is no four times as
+// much. More is asked for when it is needed (PT_MORE_ROOM). 0: no disc is in view, or threads are 0.
+void pt_plan_set_bins(struct pt_plan *plan, uint32_t threads, uint64_t had);
 // Has memory of its own from render to render: readers, or the next render, need it.
 int pt_plane_is_kept(enum pt_plane which, uint32_t index);
 

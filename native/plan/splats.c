@@ -94,7 +94,8 @@ void pt_plan_splat(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     const int behind = builder->layer > 1 || builder->behind;
-    const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_if(behind, PT_PLANE_LIMIT, 0)};
+    const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_if(behind, PT_PLANE_LIMIT, 0),
+                                    pt_plane_at(PT_PLANE_DISC_BINS, 0)};
     struct disc_pass discs;
     if (!pt_plan_draws(plan, PT_AS_DISCS)) {
         const int points = pt_plan_draws(plan, PT_AS_POINTS);
@@ -121,11 +122,16 @@ void pt_plan_splat(struct pt_builder *builder)
                   (unsigned long long)discs.chunks, discs.instances);
 }
 
+enum { BLENDED = 6 }; // planes of pixels
+
 // args: but for view, instances and sifted. NULL: the plan failed.
-static struct pt_pass *add_blend(struct pt_builder *builder, struct blend_args args, const struct pt_ref planes[6])
+static struct pt_pass *add_blend(struct pt_builder *builder, struct blend_args args, const struct pt_ref of_pixels[BLENDED])
 {
     struct disc_pass discs;
-    if (!list_discs(builder, &args, sizeof args, planes, 6, &discs))
+    struct pt_ref planes[BLENDED + 1];
+    memcpy(planes, of_pixels, BLENDED * sizeof *planes);
+    planes[BLENDED] = pt_plane_at(PT_PLANE_DISC_BINS, 0);
+    if (!list_discs(builder, &args, sizeof args, planes, BLENDED + 1, &discs))
         return NULL;
     args.view = builder->plan->view;
     args.instances = discs.instances;
@@ -150,7 +156,7 @@ void pt_plan_blend(struct pt_builder *builder)
 void pt_plan_blend_marks(struct pt_builder *builder)
 {
     const struct pt_ref none = pt_nothing(),
-                        planes[6] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), none, none, none, none};
+                        planes[BLENDED] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), none, none, none, none};
     struct pt_pass *pass = add_blend(builder, (struct blend_args){.part = PT_BLEND_MARKS}, planes);
     if (pass)
         PT_REASON(pass, "only points whose discs the picture shows need shadows");
@@ -160,7 +166,7 @@ void pt_plan_blend_light(struct pt_builder *builder)
 {
     const uint32_t casting = builder->plan->light_count;
     const struct pt_ref none = pt_nothing(), light = pt_plane_at(PT_PLANE_LIGHT, 0);
-    const struct pt_ref planes[6] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), none, light, none, none};
+    const struct pt_ref planes[BLENDED] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), none, light, none, none};
     for (uint32_t first = 0; first < casting; first += PT_BLEND_LIGHTS) {
         const uint32_t left = casting - first, lights = left < PT_BLEND_LIGHTS ? left : PT_BLEND_LIGHTS;
         const struct blend_args args = {.part = PT_BLEND_LIGHT, .first = first, .lights = lights};

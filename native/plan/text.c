@@ -30,8 +30,8 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_
         size[1] = 1;
         return;
     }
-    if (row->size == PT_SIZE_CELLS) {
-        size[0] = plan->cells;
+    if (row->size == PT_SIZE_CELLS || row->size == PT_SIZE_DISCS) {
+        size[0] = row->size == PT_SIZE_CELLS ? plan->cells : plan->disc_bins;
         size[1] = 1;
         return;
     }

@@ -40,6 +40,7 @@ struct seen {
     struct pt_extent extent; // on screen in pixels of the picture without its padding
     double spacing_px, area_px;
     uint32_t wide; // its points are discs
+    double tiles;  // that one of these touches, PT_DISC_LARGE at most
 };
 
 // ---- culling -----------------------------------------------------------------------------------------------------------
@@ -235,6 +236,8 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         const double reach = disc_reach(scene, instance, object, chunk, apart, 0) * stretch;
         seen.wide = ranges || scene->settings.surface == PATINA_SURFACE_SPLATS || reach > wide * pixel * rim ||
                     (reach > 0.0 && seen.spacing_px > left_out * SPARSE * pt_finer(scene)); // the same as of all points
+        const double across = 1.0 + (2.0 * reach / (pixel * rim) + 2.0) / PT_DISC_TILE;     // few are wider than reach
+        seen.tiles = pt_least(across * across, PT_DISC_LARGE);
         survey->points |= !seen.wide;
         survey->discs |= seen.wide && !ranges;
         list[survey->seen_count[i]++] = seen;
@@ -399,6 +402,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         pt_join_rect(out->rect, rect);
         out->points += count;
         plan->points_scattered += count;
+        plan->disc_entries += kind == PT_AS_DISCS ? seen->tiles * count : 0.0;
     }
     pt_join_rect(plan->view.rect, out->rect);
     plan->chunks_culled -= out->chunk_count;

@@ -57,6 +57,8 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
 // One picture, whatever the scene says of samples: what rendering does over and over.
 int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene); // frame_draw.c
 struct pt_plan;
+// The plan's planes in memory, as the frame's device and what it drew before have it.
+int pt_frame_share_planes(const struct patina_frame *frame, struct pt_plan *plan);
 int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scene,
                      struct pt_plan *plan); // on the frame's planes
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);

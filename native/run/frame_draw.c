@@ -120,6 +120,15 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
     return error;
 }
 
+int pt_frame_share_planes(const struct patina_frame *frame, struct pt_plan *plan)
+{
+    const struct pt_abilities abilities = {.together = pt_passes_together,
+                                           .device = frame->device,
+                                           .bin_threads = frame->device->bin_threads,
+                                           .bins_had = frame->planes.bins};
+    return pt_plan_share_planes(plan, &abilities, frame->planes.apart);
+}
+
 int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
 {
     struct pt_plan plan;
@@ -134,7 +143,7 @@ int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
     pt_note_time(&frame->times, "plan", pt_milliseconds() - start);
     frame->keys_valid = 0;
     link_planes(frame);
-    error = pt_plan_share_planes(&plan, pt_passes_together, frame->device, frame->planes.apart);
+    error = pt_frame_share_planes(frame, &plan);
     if (error)
         pt_fail(&frame->device->handle, error, "planning the frame: out of memory");
     if (!error)

@@ -201,6 +201,7 @@ int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scen
     int error = pt_plan_create(scene, &job.plan);
     if (error)
         return pt_fail_again(&frame->handle, error);
+    pt_plan_set_bins(&job.plan, frame->device->bin_threads, 0);
     error = begin(&job, &head);
     if (!error)
         error = pt_key_writer_begin(&job.writer, &frame->handle, path, &head, part->note);

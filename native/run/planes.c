@@ -171,6 +171,10 @@ int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, con
 {
     struct pt_buffer *plane = &planes->at[which][level];
     const size_t bytes = pt_plan_plane_bytes(plan, which, level);
+    if (which == PT_PLANE_DISC_BINS && bytes && plane->size > bytes)
+        return PATINA_OK; // they have grown
+    if (!bytes && !plane->room)
+        return PATINA_OK; // nobody looks at it
     if (planes->view[which][level]) {
         if (plane->size == bytes)
             return PATINA_OK;
@@ -183,6 +187,24 @@ int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, con
             return PATINA_OK;
     }
     return ensure(device, planes, plan, plane, bytes);
+}
+
+int pt_planes_grow(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, enum pt_plane which,
+                   size_t bytes)
+{
+    const uint32_t slab = planes->view[which][0];
+    struct pt_buffer *buffer = slab ? &planes->slabs[slab - 1] : &planes->at[which][0];
+    int error = ensure(device, planes, plan, buffer, bytes);
+    planes->bins = bytes;
+    for (int p = 0; p < PT_PLANE_COUNT && slab; p++)
+        for (int k = 0; k < PT_SLOTS; k++)
+            if (planes->view[p][k] == slab) { // those that come behind lie in it, too
+                const int lost = planes->lost[p][k];
+                set_view(planes, (enum pt_plane)p, (uint32_t)k, buffer, slab - 1,
+                         p == (int)which ? bytes : planes->at[p][k].size);
+                planes->lost[p][k] = (uint8_t)lost;
+            }
+    return error;
 }
 
 // Of keys all but what is known to be empty still.

@@ -17,7 +17,8 @@ struct pt_planes {
     int poisoned;                           // pt_planes_poison writes: a test of lifetimes
     uint64_t borrowed;                      // bits of the other's slabs that planes may be views of: pt_planes_borrow
     const struct pt_planes *other;
-    int varies; // in size from plan to plan, from the beginning
+    int varies;    // in size from plan to plan, from the beginning
+    uint64_t bins; // bytes that bins of discs came to when they grew
 };
 
 uint64_t pt_planes_total(const struct pt_planes *planes); // bytes that both hold
@@ -34,6 +35,9 @@ void pt_planes_borrow(struct pt_planes *planes, uint64_t slabs);
 // Room for a plane of the plan; what it holds is anything, or what it held where the size is the same. Messages are at the device.
 int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, enum pt_plane which,
                      uint32_t level);
+// More room for a plane of bins that a kernel found too small; what it held is lost.
+int pt_planes_grow(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, enum pt_plane which,
+                   size_t bytes);
 // One word everywhere.
 int pt_planes_clear(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan,
                     const struct pt_step *clear);

@@ -41,6 +41,15 @@ static int run_bound(void *context, struct pt_buffer *const *buffers)
                                call->pass->ref_count, is_output(call->pass) ? NULL : e->cancel);
 }
 
+// Bins that the pass found too small; 0: there are none.
+static int grow_bins(struct pt_execution *e, const struct pt_pass *pass, struct pt_buffer **bound)
+{
+    for (uint32_t k = 0; k < pass->ref_count; k++)
+        if (pass->refs[k].of == PT_OF_FRAME && bound[k]->wanted > bound[k]->size)
+            return pt_planes_grow(e->device, e->binder.planes, e->plan, pass->refs[k].which, bound[k]->wanted);
+    return PATINA_ERROR_INTERNAL;
+}
+
 static int run_pass(struct pt_execution *e, uint32_t i)
 {
     const struct pt_pass *pass = &e->plan->passes[i];
@@ -58,7 +67,9 @@ static int run_pass(struct pt_execution *e, uint32_t i)
         error = pt_bind(&e->binder, &pass->refs[k], &bound[k]);
     if (!error) {
         struct call call = {e, pass, arguments};
-        error = pt_pager_run(e->pager, e->plan, pass, bound, run_bound, &call);
+        do
+            error = pt_pager_run(e->pager, e->plan, pass, bound, run_bound, &call);
+        while (error == PT_MORE_ROOM && !(error = grow_bins(e, pass, bound)));
     }
     if (bound != few)
         free(bound);

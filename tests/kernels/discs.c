@@ -118,7 +118,7 @@ void discs_beside(struct harness *h, struct rng *rng, struct disc_scene *scene, 
 
 struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
 {
-    struct pt_buffer *buffers[3 + 4 * MOST_INSTANCES];
+    struct pt_buffer *buffers[4 + 4 * MOST_INSTANCES];
     const struct scene *points = &scene->points;
     const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct splat_args);
     char args[sizeof(struct splat_args) + sizeof scene->discs];
@@ -128,6 +128,8 @@ struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
     uint32_t n = 0;
     buffers[n++] = harness_buffer(h, empty, pixels * 8);
     buffers[n++] = points->limit ? harness_buffer(h, points->limit, pixels * 4) : NULL;
+    scene->bins = harness_buffer(h, NULL, 16); // too small on the processor, which says so
+    buffers[n++] = scene->bins;
     buffers[n++] = NULL; // drawn
     for (uint32_t i = 0; i < points->count; i++) {
         struct cloud *cloud = &scene->points.clouds[i];

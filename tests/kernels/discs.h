@@ -10,6 +10,7 @@ struct disc_scene {
     struct scene points;
     struct disc_args discs[MOST_INSTANCES];
     void *radii[MOST_INSTANCES]; // floats, or shape words after discs_shape
+    struct pt_buffer *bins;      // what discs_splat leaves to blend
 };
 
 // After the points' positions: args of every instance. radius: of all points, 0: radii of their own between none and

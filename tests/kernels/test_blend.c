@@ -9,7 +9,7 @@
 static const uint32_t sizes[] = {1, 15, 16, 17, 300, 500, 31, 2};
 enum {
     SIZES = sizeof sizes / sizeof sizes[0],
-    PLANES = 7,
+    PLANES = 8,
     LIGHTS = PT_BLEND_LIGHTS + 2,
     SAMPLES = 8,
     BARE = 1
@@ -237,6 +237,7 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     buffers[n++] = albedo;
     buffers[n++] = away;
     buffers[n++] = offset;
+    buffers[n++] = scene->bins;
     buffers[n++] = NULL; // drawn
     for (uint32_t i = 0; i < points->count; i++) {
         const struct cloud *cloud = &points->clouds[i];

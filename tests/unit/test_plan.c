@@ -278,7 +278,7 @@ static void test_planes_share_memory(void **state)
     for (int apart = 0; apart < 2; apart++) {
         struct pt_plan plan = plan_of(scene);
         uint32_t shared = 0;
-        assert_int_equal(pt_plan_share_planes(&plan, NULL, NULL, apart), PATINA_OK);
+        assert_int_equal(pt_plan_share_planes(&plan, &(struct pt_abilities){.bin_threads = 2}, apart), PATINA_OK);
         for (uint32_t i = 0; i < plan.life_count; i++) {
             const struct pt_life *a = &plan.lives[i];
             assert_false(pt_plane_is_kept(a->plane, a->index));
@@ -304,6 +304,43 @@ static void test_planes_share_memory(void **state)
     }
     assert_true(peaks[0] < peaks[1]);
     patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+// Bins of discs are a plane from splat to the last blend, with the room that the rule says, and none on devices without.
+static void test_bins_of_discs(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    const patina_settings settings = {
+        .struct_size = sizeof settings, .width = 64, .height = 64, .surface = PATINA_SURFACE_SPLATS};
+    for (int discs = 0; discs < 2; discs++)
+        for (uint32_t threads = 0; threads < 4; threads += 3) {
+            patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
+            assert_int_equal(!discs || patina_scene_set_settings(scene, &settings) == PATINA_OK, 1);
+            struct pt_plan plan = plan_of(scene);
+            uint32_t lives = 0;
+            assert_int_equal(pt_plan_share_planes(&plan, &(struct pt_abilities){.bin_threads = threads}, 0), PATINA_OK);
+            for (uint32_t i = 0; i < plan.life_count; i++)
+                lives += plan.lives[i].plane == PT_PLANE_DISC_BINS;
+            assert_int_equal(lives, discs && threads);
+            assert_int_equal(plan.disc_bins > 0, discs && threads);
+            for (uint32_t i = 0; i < plan.pass_count && lives; i++)
+                for (uint32_t k = 0; k < plan.passes[i].ref_count; k++)
+                    if (plan.passes[i].refs[k].of == PT_OF_FRAME && plan.passes[i].refs[k].which == PT_PLANE_DISC_BINS)
+                        assert_true(plan.passes[i].kernel == PT_KERNEL_splat || plan.passes[i].kernel == PT_KERNEL_blend);
+            if (lives) {
+                const uint64_t told = 16 * (uint64_t)plan.disc_bins;
+                assert_true(plan.disc_entries >= (double)plan.points_scattered);
+                assert_true(told >= pt_bins_bytes(pt_bins_of(&plan.view), threads, plan.points_scattered / PT_BIN_DISCS));
+                pt_plan_set_bins(&plan, threads, 2 * told); // what the picture before came to
+                assert_int_equal(16 * (uint64_t)plan.disc_bins, 2 * told);
+                pt_plan_set_bins(&plan, threads, 8 * told); // of another view
+                assert_int_equal(16 * (uint64_t)plan.disc_bins, told);
+            }
+            pt_plan_destroy(&plan);
+            patina_scene_destroy(scene);
+        }
     patina_cloud_destroy(cloud);
 }
 
@@ -755,6 +792,7 @@ int main(void)
         cmocka_unit_test(test_planes_of_the_picture),
         cmocka_unit_test(test_ink_stays_within_lines),
         cmocka_unit_test(test_planes_share_memory),
+        cmocka_unit_test(test_bins_of_discs),
         cmocka_unit_test(test_low_parts),
         cmocka_unit_test(test_chunks_around_the_camera),
         cmocka_unit_test(test_spacing_is_of_what_shows),

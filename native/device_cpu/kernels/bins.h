@@ -11,12 +11,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 
-enum {
-    PT_DISC_LARGE = 16, // a disc over more tiles than this goes to a bin that every tile looks through
-    PT_BIN_DISCS = 31,
-    PT_BIN_SHIFT = 5,
-    PT_BIN_SHARE = 32, // blocks that a thread takes at once
-};
+enum { PT_BIN_SHIFT = 5 };
 #define PT_BIN_NONE 0xFFFFFFFFu
 
 // Discs: what a walk would else look up again, each number a cache miss.
@@ -28,12 +23,14 @@ struct pt_bin_block {
     float nearest;                // no pixel of its discs is nearer
     uint32_t nothing[2];
 };
+_Static_assert(sizeof(struct pt_bin_block) == PT_BIN_BLOCK, "blocks of bins have another size");
 
 struct pt_bin_thread {
     uint32_t next, end; // blocks that it may fill
     uint32_t order;     // of the chunk at hand
     uint32_t nothing[13];
 };
+_Static_assert(sizeof(struct pt_bin_thread) == PT_BIN_THREAD, "threads of bins take another room");
 
 struct pt_bins {
     const struct pt_cpu_call *call;
@@ -45,13 +42,14 @@ struct pt_bins {
     uint32_t *cursors;                 // for each thread, of the heads of all
     uint32_t *heads;                   // by thread and bin: the block filled last << PT_BIN_SHIFT | discs in it
     struct pt_bin_block *blocks;
-    uint32_t room;
+    uint32_t room; // blocks; behind them one for each thread, whose discs are lost
     _Atomic uint32_t used;
     // while they are filled
     uint32_t *begins; // see pt_chunk_begins
     uint64_t *order;  // of chunks, farthest first: their number below
     struct pt_bin_thread *threads;
 };
+_Static_assert(sizeof(struct pt_bins) <= PT_BIN_HEAD, "the head of bins is larger");
 
 // Both kernels read the same of an instance, in the same order.
 _Static_assert(PT_BUF_splat_positions - PT_BUF_splat_chunks == PT_BUF_blend_positions - PT_BUF_blend_chunks &&
@@ -87,16 +85,17 @@ static inline vf pt_disc_nearest(const struct view_args *view, const struct pt_d
     return (d->z - d->radius * vf_set(view->perspective ? 1.002f : 1.25f)) * vf_set(0.999999f);
 }
 
-// Opens a block after the full one that ends at `head`; NULL when there is no room: it is counted, all will be done again.
+// Opens a block after the full one that ends at `head`. When there is no room it is the thread's own, and counted: all will be done
+// again.
 static inline struct pt_bin_block *pt_bin_open(struct pt_bins *bins, struct pt_bin_thread *thread, uint32_t *head)
 {
     if (thread->next == thread->end) {
         thread->next = atomic_fetch_add_explicit(&bins->used, PT_BIN_SHARE, memory_order_relaxed);
         thread->end = thread->next + PT_BIN_SHARE;
     }
-    const uint32_t next = thread->next++;
+    uint32_t next = thread->next++;
     if (next >= bins->room)
-        return NULL;
+        next = bins->room + (uint32_t)(thread - bins->threads);
     bins->blocks[next].before = *head;
     bins->blocks[next].order = thread->order;
     bins->blocks[next].nearest = pt_float(PT_KEY_EMPTY_Z);
@@ -108,8 +107,8 @@ static inline void pt_bin_put(struct pt_bins *bins, struct pt_bin_thread *thread
                               uint32_t word, float nearest)
 {
     struct pt_bin_block *block = bins->blocks + (*head >> PT_BIN_SHIFT);
-    if (*head % (1u << PT_BIN_SHIFT) == PT_BIN_DISCS && !(block = pt_bin_open(bins, thread, head))) // full, or none yet
-        return;
+    if (*head % (1u << PT_BIN_SHIFT) == PT_BIN_DISCS) // full, or none yet
+        block = pt_bin_open(bins, thread, head);
     const uint32_t at = (*head)++ % (1u << PT_BIN_SHIFT);
     memcpy(block->place[at], place, 16);
     block->word[at] = word;
@@ -228,35 +227,41 @@ static inline void pt_bin_sort(struct pt_bins *bins)
     qsort(bins->order, count, sizeof *bins->order, pt_bin_farther);
 }
 
-// Lays them out in scratch memory: itself first, for the next call.
-static inline int pt_bins_lay_out(struct pt_bins *bins, uint32_t blocks)
+// Whether the buffer has room for so many blocks. If not, that is what it wants, and an eighth more: who takes which block, and so
+// leaves some of it empty, is another thread each time.
+static inline int pt_bins_have(const struct pt_bins *bins, struct pt_buffer *buffer, uint64_t blocks)
 {
     const uint32_t threads = pt_pool_threads(bins->call->pool);
-    const size_t list_bytes = threads * sizeof *bins->threads;
-    const size_t head_bytes = ((size_t)threads * (bins->bins + threads) * 4 + 63) / 64 * 64;
-    const size_t own_bytes = (sizeof *bins + 63) / 64 * 64, fixed = own_bytes + list_bytes + head_bytes;
-    char *memory = pt_cpu_scratch(bins->call, PT_CPU_BINS, fixed + (size_t)blocks * sizeof *bins->blocks);
-    if (!memory)
-        return PATINA_ERROR_MEMORY;
-    const size_t had = bins->call->scratch[PT_CPU_BINS].size - PT_SLACK; // what an earlier picture needed is there still
-    const size_t room = (had - fixed) / sizeof *bins->blocks;
-    bins->room = (uint32_t)(room < PT_BIN_NONE >> PT_BIN_SHIFT ? room : PT_BIN_NONE >> PT_BIN_SHIFT);
-    bins->threads = (struct pt_bin_thread *)(void *)(memory + own_bytes);
-    bins->heads = (uint32_t *)(void *)(memory + own_bytes + list_bytes);
-    bins->cursors = bins->heads + (size_t)threads * bins->bins;
-    bins->blocks = (struct pt_bin_block *)(void *)(memory + own_bytes + list_bytes + head_bytes);
-    memset(bins->threads, 0, list_bytes);
-    memset(bins->heads, 0xFF, head_bytes);
-    atomic_store(&bins->used, 0);
-    return PATINA_OK;
+    const int enough = buffer->size >= pt_bins_bytes(bins->bins, threads, blocks);
+    buffer->wanted = enough ? 0 : pt_bins_bytes(bins->bins, threads, blocks + blocks / 8 + (uint64_t)threads * PT_BIN_SHARE);
+    return enough;
 }
 
-// Fills the bins. PATINA_OK, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED.
-static inline int pt_bins_fill(struct pt_bins *bins)
+// Lays them out in their buffer: themselves first, for blend.
+static inline void pt_bins_lay_out(struct pt_bins *bins, const struct pt_buffer *buffer)
+{
+    const uint32_t threads = pt_pool_threads(bins->call->pool), most = (PT_BIN_NONE >> PT_BIN_SHIFT) - threads;
+    const size_t fixed = pt_bins_bytes(bins->bins, threads, 0), room = (buffer->size - fixed) / PT_BIN_BLOCK;
+    char *memory = (char *)buffer->data + PT_BIN_HEAD;
+    bins->room = room < most ? (uint32_t)room : most;
+    bins->threads = (struct pt_bin_thread *)(void *)memory;
+    bins->heads = (uint32_t *)(void *)(bins->threads + threads);
+    bins->cursors = bins->heads + (size_t)threads * bins->bins;
+    bins->blocks = (struct pt_bin_block *)(void *)((char *)buffer->data + fixed - (size_t)threads * PT_BIN_BLOCK);
+    memset(bins->threads, 0, (size_t)((char *)bins->blocks - memory));
+    memset(bins->heads, 0xFF, (size_t)((char *)bins->blocks - (char *)bins->heads));
+    atomic_store(&bins->used, 0);
+}
+
+// Fills the bins. PATINA_OK, PATINA_ERROR_MEMORY, PATINA_ERROR_CANCELLED, or PT_MORE_ROOM where their buffer lacks some.
+static inline int pt_bins_fill(struct pt_bins *bins, struct pt_buffer *buffer)
 {
     bins->columns = (bins->view->width + PT_DISC_TILE - 1) / PT_DISC_TILE;
     bins->rows = (bins->view->height + PT_DISC_TILE - 1) / PT_DISC_TILE;
-    bins->bins = bins->columns * bins->rows + 1;
+    bins->bins = pt_bins_of(bins->view);
+    if (!pt_bins_have(bins, buffer, 0))
+        return PT_MORE_ROOM;
+    pt_bins_lay_out(bins, buffer);
     uint64_t chunks = 0;
     for (uint32_t i = 0; i < bins->instances; i++)
         chunks += bins->call->buffers[bins->first + i * bins->stride]->size / sizeof(struct chunk_view);
@@ -267,25 +272,22 @@ static inline int pt_bins_fill(struct pt_bins *bins)
     bins->begins = (uint32_t *)(void *)(bins->order + chunks);
     pt_chunk_begins(bins->call, bins->first, bins->stride, bins->instances, bins->begins);
     pt_bin_sort(bins);
-    for (uint32_t needed = 1024;; needed += needed / 4) {
-        int error = pt_bins_lay_out(bins, needed);
-        if (error)
-            return error;
-        pt_parallel(bins->call->pool, bins->begins[bins->instances], 4, pt_bin_chunks, bins);
-        if (pt_cpu_cancelled(bins->call))
-            return PATINA_ERROR_CANCELLED;
-        needed = atomic_load(&bins->used);
-        if (needed <= bins->room)
-            break;
-    }
-    memcpy(bins->call->scratch[PT_CPU_BINS].memory, bins, sizeof *bins);
+    pt_parallel(bins->call->pool, bins->begins[bins->instances], 4, pt_bin_chunks, bins);
+    if (pt_cpu_cancelled(bins->call))
+        return PATINA_ERROR_CANCELLED;
+    const uint32_t used = atomic_load(&bins->used);
+    if (used > (PT_BIN_NONE >> PT_BIN_SHIFT) - pt_pool_threads(bins->call->pool))
+        return PATINA_ERROR_MEMORY; // blocks have no more numbers
+    if (!pt_bins_have(bins, buffer, used))
+        return PT_MORE_ROOM;
+    memcpy(buffer->data, bins, sizeof *bins);
     return PATINA_OK;
 }
 
-// Takes up the bins that the same discs were filled into last.
-static inline void pt_bins_again(struct pt_bins *bins)
+// Takes up the bins that splat filled with the same discs.
+static inline void pt_bins_again(struct pt_bins *bins, const struct pt_buffer *buffer)
 {
-    const struct pt_bins *filled = bins->call->scratch[PT_CPU_BINS].memory;
+    const struct pt_bins *filled = buffer->data;
     bins->columns = filled->columns;
     bins->rows = filled->rows;
     bins->bins = filled->bins;

@@ -435,7 +435,7 @@ int PT_KERNEL_ENTRY(blend)(const struct pt_cpu_call *call)
                            .instances = args->instances,
                            .first = PT_BUF_blend_chunks,
                            .stride = PT_EACH_blend};
-    pt_bins_again(&bins);
+    pt_bins_again(&bins, call->buffers[PT_BUF_blend_bins]);
     if (!pt_cpu_scratch(call, 1, pt_pool_threads(call->pool) * sizeof(struct tile)))
         return PATINA_ERROR_MEMORY;
     pt_parallel(call->pool, bins.bins - 1, 1, blend_tiles, &bins);

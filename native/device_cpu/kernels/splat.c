@@ -111,7 +111,7 @@ int PT_KERNEL_ENTRY(splat)(const struct pt_cpu_call *call)
                            .instances = args->instances,
                            .first = PT_BUF_splat_chunks,
                            .stride = PT_EACH_splat};
-    int error = pt_bins_fill(&bins);
+    int error = pt_bins_fill(&bins, call->buffers[PT_BUF_splat_bins]);
     if (error)
         return error;
     pt_parallel(call->pool, bins.bins - 1, 1, draw_tiles, &bins);
