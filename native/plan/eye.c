@@ -189,6 +189,17 @@ int pt_chunk_bounds(const struct pt_eye *camera, const struct pt_chunk *chunk, c
     return !(rect[0] >= camera->width || rect[1] >= camera->height || rect[2] <= 0.0 || rect[3] <= 0.0);
 }
 
+int pt_kind_bounds(const struct pt_eye *camera, enum pt_kind kind, const struct pt_to_place *what, const struct pt_chunk *box,
+                   const double rows[9], const double translation[3], struct pt_extent *out)
+{
+    const struct pt_kind_row *row = &pt_kinds[kind];
+    if (!pt_chunk_bounds(camera, box, rows, translation, row->reach(what, box), row->beyond, out))
+        return 0;
+    for (int k = 0; k < 4; k++)
+        out->rect[k] += k < 2 ? -row->pixels : row->pixels;
+    return 1;
+}
+
 void pt_chunk_eye(const struct pt_object *object, const struct pt_chunk *chunk, double eye[4])
 {
     eye[3] = object->eye[3];

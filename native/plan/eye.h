@@ -60,6 +60,15 @@ void pt_chunk_translation(const struct pt_eye *camera, const struct pt_object *o
 int pt_chunk_bounds(const struct pt_eye *camera, const struct pt_chunk *chunk, const double rows[9],
                     const double translation[3], double reach, int balls, struct pt_extent *out);
 
+// The same of what is drawn in one way, as its kind's row says. box: of a chunk, or of a mesh.
+int pt_kind_bounds(const struct pt_eye *camera, enum pt_kind kind, const struct pt_to_place *what, const struct pt_chunk *box,
+                   const double rows[9], const double translation[3], struct pt_extent *out);
+// kinds.c: what nine of ten of the chunk's discs stay below, world units.
+double pt_usual_disc(const struct pt_to_place *what, const struct pt_chunk *chunk);
+// thinned: how much farther apart than its cloud's the points that are drawn lie.
+struct pt_drawn_discs pt_discs_of(const struct pt_to_place *what, double thinned);
+struct pt_drawn_balls pt_balls_of(const struct pt_to_place *what);
+
 // The object's eye, in the chunk's coordinates.
 void pt_chunk_eye(const struct pt_object *object, const struct pt_chunk *chunk, double eye[4]);
 

@@ -173,6 +173,7 @@ void pt_plan_blend(struct pt_builder *builder);          // after pt_plan_resolv
 int pt_blends_light(const struct pt_builder *builder);   // light arrives at all discs of a pixel: at the mean of their words
 void pt_plan_blend_marks(struct pt_builder *builder);    // in place of mark
 void pt_plan_blend_light(struct pt_builder *builder);    // once shadow words are known
+void pt_join_discs(const struct pt_plan_instance *instance, struct resolve_args *args); // to one surface a layer
 
 // ranges.c: instances that are drawn as range images, over the keys of the others.
 void pt_plan_ranges(struct pt_builder *builder);

@@ -307,7 +307,8 @@ static const struct {
     void (*cover)(struct pt_builder *, int shown);
     void (*front)(struct pt_builder *);
 } work_of[PT_AS_COUNT] = {
-#define PT_X(kind, source, sees, shows, in_planes, see, show, join, cover, front, ...) {see, show, join, cover, front},
+#define PT_X(kind, source, sees, shows, in_planes, reach, pixels, beyond, see, show, join, cover, front, ...)                  \
+    {see, show, join, cover, front},
     PT_KINDS(PT_X)
 #undef PT_X
 };

@@ -203,18 +203,29 @@ struct pt_plan_light {
     char reason[128];
 };
 
+// What one kind alone has of a planned instance; its own files read it.
+struct pt_drawn_discs {
+    float radius, radius_scale, radius_most, surface_scale; // as disc_args has them
+};
+struct pt_drawn_balls {
+    float radius_scale; // as gather_args has it
+};
+
 // What is drawn of an instance in one way. An instance in view whose points have footprints is two of these: its fine chunks as
 // points, and behind all others its wide ones as discs, with ids of their own (pt_disc_ids).
 struct pt_plan_instance {
     const struct pt_instance *instance;
-    uint32_t of;                  // its place in the scene: shadows are kept by it
-    double thinned;               // how much farther apart than its cloud's the points that are drawn lie
-    enum pt_kind kind;            // none of PT_AS_MESH: these are pt_plan_mesh
-    const struct pt_range *range; // PT_AS_RANGES: their image buffer (ranges.h)
+    uint32_t of;       // its place in the scene: shadows are kept by it
+    double thinned;    // how much farther apart than its cloud's the points that are drawn lie
+    enum pt_kind kind; // none of PT_AS_MESH: these are pt_plan_mesh
+    union {
+        struct pt_drawn_discs discs;
+        const struct pt_range *range; // of range images: their image buffer (ranges.h)
+        struct pt_drawn_balls balls;  // of soft points
+    } as;
     struct instance_args args;
-    float radius, radius_scale, radius_most, surface_scale; // of discs, as disc_args has them
-    struct chunk_view *chunks;                              // those in view
-    struct pt_bounds *bounds;                               // of each of them
+    struct chunk_view *chunks; // those in view
+    struct pt_bounds *bounds;  // of each of them
     uint32_t chunk_count;
     uint64_t points;                                    // of these chunks, drawn ones
     uint32_t rect[4];                                   // of its points in the planes; empty: x0 >= x1

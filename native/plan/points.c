@@ -52,22 +52,6 @@ void pt_plan_points(struct pt_builder *builder)
                   (unsigned long long)chunks, args.instances);
 }
 
-// Discs behind each other that are one surface, where layers are told apart. Without normals discs face the picture: along a slope
-// of s they lie up to s radii before and behind it, 2 radii / |n.v| in all. In its own pixel a disc that its centre's ray misses
-// lies where its point does: of a slope, up to 0.71 pixels before it or behind.
-#define DISC_PIXELS 1.5f
-#define DISC_RADII 2.3f // classes of spacings are 1.19 wide: others' discs may be as much wider
-
-static void join_discs(const struct pt_plan_instance *instance, struct resolve_args *args)
-{
-    args->view.footprint *= DISC_PIXELS;
-    if (args->instance.has_normals)
-        return;
-    args->instance.d_min = fmaxf(args->instance.d_min, DISC_RADII * instance->radius); // 0: of as many spacings
-    for (uint32_t k = 0; k < PT_SPACINGS && !(instance->radius > 0.0f); k++)
-        args->instance.spacing[k] *= DISC_RADII * PT_DISC_SPACINGS / PT_SPACING_FACTOR;
-}
-
 static void plan_center(struct pt_builder *builder, uint32_t i)
 {
     const struct center_args args = {.view = builder->plan->view};
@@ -97,7 +81,7 @@ void pt_plan_resolve(struct pt_builder *builder, uint32_t i)
                                 .sigma_scale = thick ? pt_sigma_scale(instance) : 0.0f,
                                 .with_span = plan->sigmas != 0};
     if (instance->kind == PT_AS_DISCS && plan->layers > 1)
-        join_discs(instance, &args);
+        pt_join_discs(instance, &args);
     PT_REASON(PT_ADD(builder, resolve, args,
                      {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFELS, i), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0), thick ? pt_shapes_of(instance, i) : pt_nothing(),

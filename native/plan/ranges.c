@@ -222,7 +222,7 @@ static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_ra
 
 static void add_range(struct pt_builder *builder, uint32_t i, int behind)
 {
-    const struct pt_range *range = builder->plan->instances[i].range;
+    const struct pt_range *range = builder->plan->instances[i].as.range;
     struct pt_ref chunks = pt_buffer_of(PT_CHUNKS, i);
     uint32_t pass = PT_RANGE_ALONE;
     for (enum pt_instance_buffer next = PT_FINE_CHUNKS; range; range = range->fine, chunks = pt_buffer_of(next++, i)) {

@@ -38,39 +38,23 @@ struct placing {
 
 // ---- what is in view -----------------------------------------------------------------------------------------------------
 
-static double thinned_scale(const struct patina_scene *scene, const struct pt_instance *instance,
-                            const struct pt_object *object)
-{
-    return (instance->style.soft_radius > 0.0f ? (double)instance->style.soft_radius : object->scale) * pt_thinning(scene);
-}
-
-static double ball_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object,
-                         const struct pt_chunk *chunk)
-{
-    const double radius = instance->style.soft_radius > 0.0f ? 1.0 : pt_soft_reach(instance->cloud, chunk);
-    return fmin(radius * thinned_scale(scene, instance, object), (double)PT_SOFT_WIDEST);
-}
-
 static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct depths *depths, const struct pt_sieve *sieve,
                        const struct pt_object *object, const double rows[9], const struct pt_chunk *chunk)
 {
     struct pt_plan *plan = p->plan;
     struct pt_extent extent;
     double translation[3];
-    // where the eye is close, records are as wide as a pixel at least
-    const double reach = ball_reach(p->scene, out->instance, object, chunk);
+    const struct pt_to_place what = {p->scene, out->instance, object};
     if (pt_sieve_chunk(sieve, chunk, NULL, NULL) == PT_CUT_AWAY) {
         plan->chunks_clipped += (uint64_t)pt_all_soft(out->instance);
         return PATINA_OK;
     }
     pt_chunk_translation(p->eye, object, chunk, translation);
-    if (!pt_chunk_bounds(p->eye, chunk, rows, translation, reach, 1, &extent))
+    if (!pt_kind_bounds(p->eye, PT_AS_SOFT, &what, chunk, rows, translation, &extent))
         return PATINA_OK;
     const struct patina_cloud *cloud = out->instance->cloud;
     if (!pt_plan_page(cloud, (uint32_t)(chunk - cloud->chunks), p->eye, object, &extent))
         return PATINA_OK;
-    for (int k = 0; k < 4; k++)
-        extent.rect[k] += k < 2 ? -2.0 * (double)PT_SOFT_LEAST : 2.0 * (double)PT_SOFT_LEAST;
     const double pixel = (double)plan->view.footprint * (plan->view.perspective ? fabs(extent.z_beyond) : 1.0) *
                          (double)PT_SOFT_LEAST;
     const struct depths own = {nextafterf((float)(extent.z_before - pixel), -INFINITY),
@@ -109,7 +93,7 @@ static int place_instance(struct placing *p, uint32_t i)
     pt_object_of(p->eye, instance->style.world_from_object, &object);
     pt_object_rows(p->eye, &object, rows);
     pt_set_instance(p->eye, &object, instance, pt_thinning(p->scene), &out->args);
-    out->radius_scale = (float)fmin(thinned_scale(p->scene, instance, &object), (double)PT_SOFT_WIDEST);
+    out->as.balls = pt_balls_of(&(struct pt_to_place){p->scene, instance, &object});
     for (uint32_t c = 0; c < cloud->chunk_count && !error && instance->style.transparency < 1.0f; c++)
         error = place_chunk(p, out, depths, &sieve, &object, rows, &cloud->chunks[c]);
     p->plan->soft_count += out->chunk_count > 0;
@@ -307,8 +291,10 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
     const struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     const patina_cloud_style *style = &instance->instance->style;
-    struct gather_args args = {
-        .radius_scale = instance->radius_scale, .opacity = style->soft_opacity, .within = 1, .sifted = plan->drawn_words > 0};
+    struct gather_args args = {.radius_scale = instance->as.balls.radius_scale,
+                               .opacity = style->soft_opacity,
+                               .within = 1,
+                               .sifted = plan->drawn_words > 0};
     pt_shade_lights(builder, pt_receives(instance->instance), &args.shade);
     args.shade.view = plan->view;
     args.shade.instance = instance->args;

@@ -28,11 +28,6 @@
 // show what lies behind, in 6 % of a patch of a carved relief whose points lie 2.6 pixels apart.
 #define SPARSE 2.1
 
-// Of footprints, where discs alone make the surface: a footprint ends about where its neighbours' begin, and filling closes what lies
-// between. Of a sphere of random points 1.2 % stays open at 1, 0.03 at 1.4, 0.01 at 1.55; at 1.6 sharp edges and slits lose half a
-// decibel. Borders, lines and foliage end where they end.
-#define SURFACE_SCALE 1.55f
-
 // One chunk in view, before it is known which window the planes get.
 struct seen {
     uint32_t chunk;
@@ -44,40 +39,6 @@ struct seen {
 };
 
 // ---- culling -----------------------------------------------------------------------------------------------------------
-
-// No disc is wider than this; 0: as wide as it is.
-static double radius_most(const struct pt_instance *instance, double thinned)
-{
-    return fmin(0.5 * (double)instance->style.largest_gap * thinned, (double)PT_DISC_MOST);
-}
-
-static float surface_scale(const struct patina_scene *scene)
-{
-    return scene->settings.surface == PATINA_SURFACE_SPLATS ? SURFACE_SCALE : 1.0f;
-}
-
-static double own_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object,
-                        const struct pt_chunk *chunk, double thinned, int most)
-{
-    if (instance->style.radius > 0.0f)
-        return (double)instance->style.radius * thinned;
-    if (instance->cloud->info.has_radii)
-        return (double)instance->cloud->info.radius_most * object->scale * thinned;
-    if (instance->cloud->shapes)
-        return (double)(surface_scale(scene) * (most ? chunk->reach : chunk->footprint)) * object->scale * thinned;
-    return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale *
-           thinned; // classes of spacings are 1.19 wide
-}
-
-// Radii of the chunk's discs, world units: the largest, or what nine of ten stay below. 0 where points stay pixels.
-static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object,
-                         const struct pt_chunk *chunk, double thinned, int most)
-{
-    if (!pt_knows_discs(scene, instance))
-        return 0.0;
-    const double reach = own_reach(scene, instance, object, chunk, thinned, most), limit = radius_most(instance, thinned);
-    return limit > 0.0 ? fmin(reach, limit) : reach;
-}
 
 enum facing { FACES_AWAY, FACES_BOTH, FACES_US };
 
@@ -186,7 +147,9 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
     survey->sieves[i] = pt_sieve_make(scene, instance, PT_SOLID_POINTS, clips);
-    const int ranges = pt_draws_ranges(scene, instance);
+    const int ranges = pt_draws_ranges(scene, instance), discs = pt_knows_discs(scene, instance);
+    const enum pt_kind kind = ranges ? PT_AS_RANGES : discs ? PT_AS_DISCS : PT_AS_POINTS; // that reaches farthest
+    const struct pt_to_place what = {scene, instance, object};
     struct pt_detail detail;
     pt_detail_begin(scene, plan, instance, &detail);
     const double apart = pt_thinning(scene), wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
@@ -206,8 +169,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (cull && facing == FACES_AWAY)
             continue;
         pt_chunk_translation(camera, object, chunk, translation);
-        if (!pt_chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), 0,
-                             &seen.extent))
+        if (!pt_kind_bounds(camera, kind, &what, chunk, rows, translation, &seen.extent))
             continue;
         const double pixel = pt_most(camera->xs, camera->ys), middle = seen.extent.z_middle;
         const double before = camera->orthographic ? 1.0 : pt_most(seen.extent.z_before, 0.0);
@@ -233,7 +195,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
                                        sqrt(chunk_cosine(known, angle, spread));
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = pt_least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
-        const double reach = disc_reach(scene, instance, object, chunk, apart, 0) * stretch;
+        const double reach = discs ? pt_usual_disc(&what, chunk) * stretch : 0.0;
         seen.wide = ranges || scene->settings.surface == PATINA_SURFACE_SPLATS || reach > wide * pixel * rim ||
                     (reach > 0.0 && seen.spacing_px > left_out * SPARSE * pt_finer(scene)); // the same as of all points
         const double across = 1.0 + (2.0 * reach / (pixel * rim) + 2.0) / PT_DISC_TILE;     // few are wider than reach
@@ -358,16 +320,16 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     const struct pt_eye *eye = range ? &range->eye : &survey->camera;
     const double thinned = survey->thinned[i];
     const double faces = range ? (double)pt_range_reach(survey->cells[i].pixels[0]) : 0.0;
-    out->range = range;
+    const struct pt_to_place what = {scene, instance, &survey->objects[i]};
     out->instance = instance;
     out->of = i;
     out->thinned = thinned;
     out->kind = kind;
     out->marked = pt_is_marked(instance);
-    out->radius = (float)fmin((double)instance->style.radius * thinned, (double)PT_DISC_MOST);
-    out->radius_most = (float)radius_most(instance, thinned);
-    out->surface_scale = surface_scale(scene);
-    out->radius_scale = (float)fmin(survey->objects[i].scale * thinned, (double)PT_DISC_MOST);
+    if (kind == PT_AS_DISCS)
+        out->as.discs = pt_discs_of(&what, thinned);
+    else
+        out->as.range = range;
     pt_set_instance(&survey->camera, &survey->objects[i], instance, thinned, &out->args);
     out->args.id_base += id_base;
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
@@ -473,7 +435,8 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
     pt_object_of(camera, instance->mesh_style.world_from_object, &object);
     pt_object_rows(camera, &object, rows);
     pt_chunk_translation(camera, &object, &mesh->box, translation);
-    if (!pt_mesh_drawn(mesh) || !pt_chunk_bounds(camera, &mesh->box, rows, translation, 0.0, 0, &extent) ||
+    const struct pt_to_place what = {.instance = instance, .object = &object};
+    if (!pt_mesh_drawn(mesh) || !pt_kind_bounds(camera, PT_AS_MESH, &what, &mesh->box, rows, translation, &extent) ||
         !pt_rect_in_window(&plan->view, extent.rect, 0, out->rect))
         return;
     struct mesh_args *args = &out->args;

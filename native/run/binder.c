@@ -117,7 +117,7 @@ static int bind_instance(struct pt_binder *binder, const struct pt_ref *ref, str
     }
     if (ref->which >= PT_FINE_CHUNKS && ref->which < PT_FINE_CHUNKS + PT_RANGE_FINER) {
         const uint32_t level = ref->which - PT_FINE_CHUNKS;
-        const struct pt_range *fine = planned->range->fine;
+        const struct pt_range *fine = planned->as.range->fine;
         for (uint32_t k = 0; k < level; k++)
             fine = fine->fine;
         *out = &bound->fine[level];

@@ -715,6 +715,7 @@ static void check_kind(const struct pt_plan *plan, enum pt_kind kind, int drawn)
     const enum pt_kernel binds = row->sees == PT_KERNEL_coarsen ? PT_KERNEL_scatter : row->sees;
     const uint32_t of = row->source == PT_SOURCE_MESH ? PT_OF_MESH : PT_OF_INSTANCE;
     uint32_t bound = 0, of_kind = 0;
+    assert_true(row->reach && row->pixels >= 0.0);
     for (uint32_t i = 0; i < plan->instance_count; i++)
         of_kind += (uint32_t)pt_draws(&plan->instances[i], kind);
     if (kind != PT_AS_SOFT && kind != PT_AS_MESH)
