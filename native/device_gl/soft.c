@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of soft points: gather, and soft, whose tiles are drawn in batches as large as their lists fit the bins. For these their lengths are
-// read back, once a run.
+// read back, once a run. Long lists are drawn in parts, each of the tiles that the part before left unfinished.
 #include "device_gl.h"
 #include "shared/balls.h"
 
@@ -32,6 +32,8 @@ enum { RUN = 256, GROUP = 64 }; // tiles between two looks at cancel; invocation
 enum { TOLD = 64, ENTRY = 8, STATE = 32 }; // bytes: what is counted; an entry of a list; a pixel, as in soft.comp
 enum { SORTED_AT_ONCE = 1 << 16 };         // entries of a list: 17 * 8 rounds of 128 steps
 enum { STEPS = 60000 };                    // through loops, that llvmpipe takes: it ends them beyond 65,535
+enum { LIST = PT_GL_LIST_HEAD + 4 * RUN }; // bytes of a list of tiles; there are two, as in soft.comp
+enum { LOOK = 16 };                        // parts before it is looked whether others follow; then as many again
 
 struct soft {
     const struct pt_gl_work *work;
@@ -65,7 +67,7 @@ static int make_room(struct pt_gl_device *d, const struct soft *soft)
     } rooms[] = {{PT_GL_SCRATCH_SOFT_COUNTS, PT_BIND_soft_counts, ((size_t)soft->tiles + 1) * 4},
                  {PT_GL_SCRATCH_SOFT_BEGINS, PT_BIND_soft_begins, ((size_t)soft->tiles + 1) * 4},
                  {PT_GL_SCRATCH_SOFT_STATES, PT_BIND_soft_states, (size_t)RUN * PT_SOFT_TILE * PT_SOFT_TILE * STATE},
-                 {PT_GL_SCRATCH_COUNTERS, PT_BIND_soft_unfinished, 4}};
+                 {PT_GL_SCRATCH_COUNTERS, PT_BIND_soft_unfinished, 2 * LIST}};
     int result = PATINA_OK;
     for (size_t i = 0; i < sizeof rooms / sizeof rooms[0] && result == PATINA_OK; i++) {
         result = pt_gl_scratch(d, rooms[i].use, rooms[i].size, 0);
@@ -75,18 +77,19 @@ static int make_room(struct pt_gl_device *d, const struct soft *soft)
     return result;
 }
 
-static void clear(struct pt_gl_device *d, GLuint name, size_t size)
+static void clear(struct pt_gl_device *d, GLuint name, size_t offset, size_t size)
 {
     const uint32_t zero = 0;
     d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, name);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)size, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, (GLintptr)offset, (GLsizeiptr)size, GL_RED_INTEGER,
+                             GL_UNSIGNED_INT, &zero);
     d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
 static int run_records(struct pt_gl_device *d, const struct soft *soft, uint32_t step)
 {
     uint32_t x, y;
-    clear(d, d->scratch[PT_GL_SCRATCH_SOFT_COUNTS].name, (size_t)soft->tiles * 4);
+    clear(d, d->scratch[PT_GL_SCRATCH_SOFT_COUNTS].name, 0, (size_t)soft->tiles * 4);
     pt_gl_grid((soft->args->records + GROUP - 1) / GROUP, &x, &y);
     return pt_gl_dispatch(d, PT_KERNEL_soft, step, x, y);
 }
@@ -99,8 +102,7 @@ static uint32_t longest(const struct soft *soft, uint32_t first, uint32_t end)
     return most;
 }
 
-// A workgroup for each of these tiles.
-static int run_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t variant, uint32_t first, uint32_t end,
+static int set_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t variant, uint32_t first, uint32_t end,
                      uint32_t part)
 {
     const GLuint program = d->programs[PT_KERNEL_soft][variant];
@@ -109,7 +111,15 @@ static int run_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t v
     d->gl.ProgramUniform1ui(program, 0, first);
     d->gl.ProgramUniform1ui(program, 1, end);
     d->gl.ProgramUniform1ui(program, 3, part);
-    return pt_gl_dispatch(d, PT_KERNEL_soft, variant, end - first, 1);
+    return PATINA_OK;
+}
+
+// A workgroup for each of these tiles.
+static int run_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t variant, uint32_t first, uint32_t end,
+                     uint32_t part)
+{
+    const int result = set_tiles(d, soft, variant, first, end, part);
+    return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_soft, variant, end - first, 1) : result;
 }
 
 static int sort_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end)
@@ -128,23 +138,56 @@ static int sort_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t 
     return result;
 }
 
-// In parts: of discs as many as the longest list has; balls, whose steps nobody knows beforehand, until no pixel is left unfinished.
+// After so many parts no pixel is left unfinished, for each but the last takes PT_SOFT_PART steps at least. Of m balls on a ray there are
+// 2 m places where one begins or ends; next_end takes 2 m steps to find the next of them, and once more to find none.
+static uint64_t most_parts(const struct soft *soft, uint64_t most)
+{
+    uint64_t steps = most + (2 * most + 1) * 2 * most;
+    if (soft->args->veils) {
+        const uint32_t set = soft->args->shells, known = (uint32_t)PT_SOFT_SHELLS, shells = set > known ? set : known;
+        steps = most * (1 + ((uint64_t)soft->args->veils + 1) * (1 + (uint64_t)shells));
+    } else if (PT_SOFT_DISCS(soft->model)) {
+        return most ? (most + PT_SOFT_PART - 1) / PT_SOFT_PART : 1;
+    }
+    return 1 + steps / PT_SOFT_PART;
+}
+
+// Of all these tiles, or of those that the part before left.
+static int draw_part(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end, uint32_t part)
+{
+    const GLuint lists = d->scratch[PT_GL_SCRATCH_COUNTERS].name;
+    clear(d, lists, part % 2 * LIST, PT_GL_LIST_HEAD);
+    int result = set_tiles(d, soft, soft->draw, first, end, part);
+    if (result != PATINA_OK)
+        return result;
+    if (!part)
+        return pt_gl_dispatch(d, PT_KERNEL_soft, soft->draw, end - first, 1);
+    result = pt_gl_list_groups(d, PT_BIND_soft_unfinished, 2, LIST, 1, 1);
+    return result == PATINA_OK ? pt_gl_list_dispatch(d, PT_KERNEL_soft, soft->draw, lists, (part + 1) % 2 * LIST) : result;
+}
+
+static int is_over(struct pt_gl_device *d, uint32_t part)
+{
+    uint32_t head[PT_GL_LIST_HEAD / 4];
+    d->gl.BindBuffer(GL_COPY_READ_BUFFER, d->scratch[PT_GL_SCRATCH_COUNTERS].name);
+    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, part % 2 * LIST, sizeof head, head);
+    return !head[3];
+}
+
+// Parts that find nothing to do cost next to nothing, so on a GPU it is looked for an end only where there may be many; software, which
+// has done its work, looks behind each.
 static int draw_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end)
 {
-    const GLuint flag = d->scratch[PT_GL_SCRATCH_COUNTERS].name;
-    const uint32_t most = longest(soft, first, end);
-    uint32_t unfinished = 1;
+    const uint64_t most = most_parts(soft, longest(soft, first, end));
+    uint64_t look = d->base.info.hardware ? LOOK : 1;
     int result = PATINA_OK;
-    if (PT_SOFT_DISCS(soft->model) && !soft->args->veils) {
-        for (uint32_t part = 0; (!part || part * PT_SOFT_PART < most) && result == PATINA_OK; part++)
-            result = run_tiles(d, soft, soft->draw, first, end, part);
-        return result;
-    }
-    for (uint32_t part = 0; unfinished && result == PATINA_OK; part++) {
-        clear(d, flag, sizeof unfinished);
-        result = run_tiles(d, soft, soft->draw, first, end, part);
-        d->gl.BindBuffer(GL_COPY_READ_BUFFER, flag);
-        d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof unfinished, &unfinished);
+    for (uint64_t part = 0; part < most && result == PATINA_OK; part++) {
+        result = draw_part(d, soft, first, end, (uint32_t)part);
+        if (result != PATINA_OK || part + 1 < look || part + 1 == most)
+            continue;
+        if (is_over(d, (uint32_t)part))
+            break;
+        look = d->base.info.hardware ? 2 * look : look + 1;
     }
     return result;
 }
@@ -209,7 +252,7 @@ int pt_gl_soft(struct pt_gl_device *d, const struct pt_gl_work *work)
     int result = programs(d, &soft);
     if (result == PATINA_OK)
         result = make_room(d, &soft);
-    clear(d, work->buffers[PT_BUF_soft_bins]->name, TOLD);
+    clear(d, work->buffers[PT_BUF_soft_bins]->name, 0, TOLD);
     if (result == PATINA_OK)
         result = run_records(d, &soft, COUNT);
     if (result == PATINA_OK) {

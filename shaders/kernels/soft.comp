@@ -5,7 +5,8 @@
 // 2: a workgroup sorts a list, by depth and record, so that the order is that of the processor; 3: a workgroup draws a tile, or
 // (VEIL, of a light's view) adds up what its rays lose.
 // No invocation takes more than about 50,000 steps through its loops, since llvmpipe ends them at 65,535: long lists are sorted a
-// round at a time, and drawn in parts, with what pixels have come to in between.
+// round at a time, and drawn in parts, with what pixels have come to in between; a part lists the tiles that it leaves unfinished, and the
+// next has a workgroup for each of those.
 #version 430 core
 #include "shared/balls.h"
 #include "lib/math.glsl"
@@ -158,6 +159,28 @@ void main()
 
 #else // STEP == 3
 
+// Two lists, of this part and the one before: three words of an indirect dispatch, their length, and 256 tiles.
+layout(std430, binding = BIND_unfinished) buffer unfinished_block { uint unfinished[]; };
+
+#define LIST_WORDS 260u // as in native/device_gl/soft.c
+
+shared uint shared_unfinished; // 1: some pixel of the tile is
+
+// This workgroup's tile.
+uint tile_of()
+{
+    return part == 0u ? first_tile + group() : unfinished[((part + 1u) & 1u) * LIST_WORDS + 4u + group()];
+}
+
+// By all invocations, behind a barrier that follows their shared_unfinished.
+void list_tile(uint tile)
+{
+    if (gl_LocalInvocationIndex != 0u || shared_unfinished == 0u)
+        return;
+    uint list = (part & 1u) * LIST_WORDS;
+    unfinished[list + 4u + atomicAdd(unfinished[list + 3u], 1u)] = tile;
+}
+
 struct pixel {
     float through, density;
     vec3 color;
@@ -168,7 +191,6 @@ struct pixel {
 };
 
 layout(std430, binding = BIND_states) buffer states_block { float states[]; }; // STATE of each pixel of these tiles
-layout(std430, binding = BIND_unfinished) buffer unfinished_block { uint unfinished[]; };
 
 #define STATE 8u
 
@@ -532,16 +554,16 @@ void keep(uint at, pixel own)
 void main()
 {
     view_args view = args.view;
-    uint tile = first_tile + group();
+    uint tile = tile_of();
     if (gl_LocalInvocationIndex == 0u)
-        shared_fragments = 0u;
+        shared_fragments = shared_unfinished = 0u;
     barrier();
     bool ours = tile < end_tile;
     uint begin = ours ? begins[tile] : 0u, count = ours ? begins[tile + 1u] - begin : 0u;
     uvec2 corner = uvec2(view.rect[0], view.rect[1]) + PT_SOFT_TILE * uvec2(tile % columns, tile / columns);
     uvec2 here = corner + gl_LocalInvocationID.xy;
     bool inside = ours && here.x < view.rect[2] && here.y < view.rect[3];
-    uint state = STATE * (group() * PT_SOFT_TILE * PT_SOFT_TILE + gl_LocalInvocationIndex);
+    uint state = STATE * ((tile - first_tile) * PT_SOFT_TILE * PT_SOFT_TILE + gl_LocalInvocationIndex);
     pixel own = pixel(1.0, 0.0, vec3(0.0), 0.0, 0.0, 0u, 0.0, 0.0, 0.0, false);
     if (inside) {
         uint at = here.y * view.width + here.x;
@@ -557,11 +579,13 @@ void main()
         draw(view, begin, count, ivec2(view.origin_x, view.origin_y) + ivec2(corner), inside && !ended, own);
     keep(state, own);
     if (own.unfinished)
-        unfinished[0] = 1u;
+        atomicOr(shared_unfinished, 1u);
     else if (inside && !ended)
         save(view, here, own);
     atomicAdd(shared_fragments, own.fragments);
+    memoryBarrierShared();
     barrier();
+    list_tile(tile);
     if (gl_LocalInvocationIndex == 0u && shared_fragments != 0u) {
         uint before = atomicAdd(told[0], shared_fragments);
         if (before + shared_fragments < before)

@@ -82,16 +82,22 @@ bool add(view_args view, uint begin, uint count, uvec2 corner, bool inside, uint
 void main()
 {
     view_args view = args.view;
-    uint tile = first_tile + group();
+    uint tile = tile_of();
+    if (gl_LocalInvocationIndex == 0u)
+        shared_unfinished = 0u;
+    barrier();
     bool ours = tile < end_tile;
     uint begin = ours ? begins[tile] : 0u, count = ours ? begins[tile + 1u] - begin : 0u;
     uvec2 corner = uvec2(view.rect[0], view.rect[1]) + PT_SOFT_TILE * uvec2(tile % columns, tile / columns);
     uvec2 here = corner + gl_LocalInvocationID.xy;
     bool inside = ours && here.x < view.rect[2] && here.y < view.rect[3];
     uint at = (here.y * view.width + here.x) * args.veils;
-    uint state = STATE * (group() * PT_SOFT_TILE * PT_SOFT_TILE + gl_LocalInvocationIndex);
+    uint state = STATE * ((tile - first_tile) * PT_SOFT_TILE * PT_SOFT_TILE + gl_LocalInvocationIndex);
     if (add(view, begin, count, corner, inside, at, state) && inside)
-        unfinished[0] = 1u;
+        atomicOr(shared_unfinished, 1u);
+    memoryBarrierShared();
+    barrier();
+    list_tile(tile);
     precise float sum = 0.0;
     for (uint k = 0u; inside && args.last != 0u && k < args.veils; k++) {
         sum = sum + veil[at + k];
