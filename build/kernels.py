@@ -9,16 +9,18 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 LIST = ROOT / "native/kernels.def"
 BINDINGS = 12  # storage blocks that a shader may have: what OpenGL 4.3 drivers offer at the least, but for its minimum of 8
+UNIFORMS = 12  # uniform blocks that every driver offers a shader; the first is that of lib/srgb.glsl
 TILE_LIST = "tile_list"  # in the last binding, whatever the kernel: see lib/tiles.glsl
 DOMAINS = ("tiles", "rectangle", "crop", "points", "bins", "triangles")
 STAGES = ("points", "ranges", "measured", "filling", "means", "meshes", "shadows", "lines", "effects", "colors", "picture", "balls")
-PLACES = ("window", "own", "finer", "coarser", "crop", "tiles", "cloud", "mesh")
+PLACES = ("window", "own", "finer", "coarser", "crop", "tiles", "cloud", "mesh", "plan")
 ACCESS = ("r", "w", "rw")
 
 
 @dataclass
 class Buffer:
-    """A buffer of a kernel; binding: of its storage block, 0: it has none; unit: index of its buffer texture, -1: none."""
+    """A buffer of a kernel; binding: of its storage block, 0: it has none; unit: index of its buffer texture, -1: none; uniform: of
+    its uniform block, 0: it is none."""
 
     name: str
     formats: list[str]
@@ -30,6 +32,8 @@ class Buffer:
     binding: int = 0
     unit: int = -1
     soft: bool = False  # a texture only in software
+    in_uniform: bool = False
+    uniform: int = 0
 
 
 @dataclass
@@ -62,6 +66,13 @@ class Kernel:
             return self.blocks_of.blocks
         return {**{b.name: b.binding for b in self.buffers if b.block}, **self.scratch}
 
+    @property
+    def uniforms(self) -> dict[str, int]:
+        """Name -> binding of every uniform block."""
+        if self.blocks_of:
+            return self.blocks_of.uniforms
+        return {"srgb": 0, **{b.name: b.uniform for b in self.buffers if b.in_uniform}}
+
 
 @dataclass
 class Listing:
@@ -86,12 +97,14 @@ def _buffer(words: list[str], listing: Listing) -> Buffer:
         unit = word[5:] if word.startswith("soft:") else word
         if word == "block":
             buffer.block = True
+        elif word == "uniform" and access == "r":
+            buffer.in_uniform = True
         elif word == "-" and len(words) == 5:
             pass
         elif unit in listing.units and buffer.unit < 0:
             buffer.unit, buffer.soft = list(listing.units).index(unit), unit != word
         else:
-            raise ValueError(f"{word} is neither block nor a unit, nor - alone")
+            raise ValueError(f"{word} is neither block, nor uniform of what is only read, nor a unit, nor - alone")
     return buffer
 
 
@@ -118,6 +131,8 @@ def _number(kernel: Kernel) -> None:
     for buffer in kernel.buffers:
         if buffer.block:
             buffer.binding, binding = binding, binding + 1
+        elif buffer.in_uniform:
+            buffer.uniform = max(kernel.uniforms.values()) + 1
     for name in kernel.scratch:
         if name in kernel.shares:
             kernel.scratch[name] = next(b.binding for b in kernel.buffers if b.name == kernel.shares[name])
@@ -127,6 +142,8 @@ def _number(kernel: Kernel) -> None:
         kernel.scratch[TILE_LIST] = BINDINGS - 1
     if binding > BINDINGS - (TILE_LIST in kernel.scratch):
         raise ValueError(f"{kernel.name} has {binding} storage blocks: too many")
+    if len(kernel.uniforms) > UNIFORMS:
+        raise ValueError(f"{kernel.name} has {len(kernel.uniforms)} uniform blocks: too many")
     units = [b.unit for b in kernel.buffers if b.unit >= 0]
     if len(set(units)) != len(units):
         raise ValueError(f"{kernel.name}: two buffers share a texture unit")

@@ -17,11 +17,12 @@
 struct pt_buffer_row {
     const char *name;
     uint32_t formats; // bits 1 << pt_format: any of them
-    uint8_t places;   // bits PT_AT_*: any of them
+    uint16_t places;  // bits PT_AT_*: any of them
     uint8_t read, written, optional;
     uint8_t binding; // of its storage block in GLSL; 0: it has none
     uint8_t unit;    // 1 + pt_unit of its buffer texture there; 0: it is none
     uint8_t soft;    // this texture only in software
+    uint8_t uniform; // binding of its uniform block there; 0: it is none
 };
 
 struct pt_kernel_row {

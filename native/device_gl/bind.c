@@ -55,6 +55,8 @@ static int bind_row(struct pt_gl_device *d, const struct pt_gl_work *work, const
 {
     const int missing = !buffer || !buffer->name, texture = row->unit && !(row->soft && d->base.info.hardware);
     int result = PATINA_OK;
+    if (row->uniform && !missing)
+        d->gl.BindBufferRange(GL_UNIFORM_BUFFER, row->uniform, buffer->name, 0, (GLsizeiptr)buffer->size);
     if (row->binding && !(texture && row->soft))
         result = pt_gl_bind(d, row->binding, missing ? d->arguments : buffer->name, 0,
                             missing ? work->argument_size : buffer->size, pt_kernels[work->kernel].name);

@@ -160,8 +160,8 @@ int pt_gl_list_groups(struct pt_gl_device *d, uint32_t binding, uint32_t count, 
 // As many workgroups as a head in a buffer says.
 int pt_gl_list_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head);
 
-// The lights of a program with lib/phong.glsl.
-void pt_gl_set_lights(struct pt_gl_device *d, GLuint program, const struct shade_args *args);
+// The scales of shadow words of a program with lib/phong.glsl.
+void pt_gl_set_scales(struct pt_gl_device *d, GLuint program, const struct shade_args *args);
 
 // raster.c, scatter.c, fill.c, pixels.c, soft.c: kernels of several dispatches. They find their buffers bound, and tiles listed where
 // that is their domain. pt_gl_points: one dispatch over the points of an instance; pt_gl_points_of: of this program.

@@ -36,10 +36,7 @@ enum { SHOWN = PT_GL_VARIANTS - 1 }; // among shade's programs: lib/shown.glsl
 // What a light kernel must know: llvmpipe runs every branch that any lane may take.
 static int plain_lights(const struct shade_args *args)
 {
-    for (uint32_t i = 0; i < args->light_count; i++)
-        if (args->lights[i].type > PATINA_LIGHT_POINT || args->lights[i].shadow)
-            return 0;
-    return 1;
+    return !args->casting && args->light_types < 2u << PATINA_LIGHT_POINT;
 }
 
 static int of_plane(const struct instance_args *instance)
@@ -58,13 +55,13 @@ static void shade_definitions(const struct shade_args *args, int shading, char *
         snprintf(lights, sizeof lights, "%uu", args->light_count);
     snprintf(text, size,
              "#define SHADING %d\n#define ARRIVED %d\n#define OPACITY %u\n#define COLOR_FORMAT %u\n#define LIT %d\n"
-             "#define LIGHTS %s\n#define PLAIN %d\n#define RECOLOR %d\n#define DIRECTED %d\n%s",
+             "#define LIGHTS %s\n#define PLAIN %d\n#define CASTING %d\n#define RECOLOR %d\n#define DIRECTED %d\n%s",
              shading, args->arrived != 0, opacity, instance->color_format % 6,
              !instance->lit              ? 0
              : instance->specular > 0.0f ? 2
                                          : 1,
-             lights, plain_lights(args), args->recolor.source || args->recolor.graded, args->directed && instance->lit,
-             blend[args->blend < 2 ? args->blend : 2]);
+             lights, plain_lights(args), args->casting > 0, args->recolor.source || args->recolor.graded,
+             args->directed && instance->lit, blend[args->blend < 2 ? args->blend : 2]);
 }
 
 // Variants are numbered as they come; beyond the last, it gives way.
@@ -84,22 +81,10 @@ static int shade_program(struct pt_gl_device *d, const char *definitions, uint32
 }
 
 // In a uniform array: read once for all lanes, where a block would be read once a lane.
-void pt_gl_set_lights(struct pt_gl_device *d, GLuint program, const struct shade_args *args)
+void pt_gl_set_scales(struct pt_gl_device *d, GLuint program, const struct shade_args *args)
 {
-    GLfloat lights[PT_MAX_LIGHTS][12] = {{0}};
-    for (uint32_t i = 0; i < args->light_count && i < PT_MAX_LIGHTS; i++) {
-        const struct light_args *light = &args->lights[i];
-        for (int k = 0; k < 3; k++) {
-            lights[i][k] = light->color[k];
-            lights[i][4 + k] = light->vector[k];
-        }
-        lights[i][3] = (GLfloat)light->type;
-        lights[i][8] = light->cone[0];
-        lights[i][9] = light->cone[1];
-        lights[i][10] = (GLfloat)light->shadow;
-        lights[i][11] = light->shadow_scale;
-    }
-    d->gl.ProgramUniform4fv(program, 16, 3 * PT_MAX_LIGHTS, &lights[0][0]);
+    if (args->casting)
+        d->gl.ProgramUniform1fv(program, 16, PT_MAX_LIGHTS, args->scales);
 }
 
 // What a wide blend of normals fetches, once for all instances.
@@ -130,8 +115,8 @@ int pt_gl_shade(struct pt_gl_device *d, const struct pt_gl_work *work)
     int result = shade_program(d, definitions, &variant);
     if (result == PATINA_OK && args->blend > 1)
         result = bind_shown(d, &args->view, work->buffers[PT_BUF_shade_keys]);
-    if (result == PATINA_OK && args->instance.lit)
-        pt_gl_set_lights(d, d->programs[PT_KERNEL_shade][variant], args);
+    if (result == PATINA_OK)
+        pt_gl_set_scales(d, d->programs[PT_KERNEL_shade][variant], args);
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, variant, PT_GL_TILES_POINTS) : result;
 }
 

@@ -12,17 +12,17 @@ int pt_gl_gather(struct pt_gl_device *d, const struct pt_gl_work *work)
     const struct shade_args *args = &((const struct gather_args *)work->arguments)->shade;
     const struct instance_args *instance = &args->instance;
     const uint32_t opacity = instance->has_opacities != 0, lit = !instance->lit ? 0 : instance->specular > 0.0f ? 2 : 1;
-    const uint32_t directed = args->directed && lit,
-                   variant = instance->color_format % 5 + 5 * (lit + 3 * (opacity + 2 * directed));
+    const uint32_t directed = args->directed && lit, casting = args->casting && lit,
+                   variant = instance->color_format % 5 + 5 * (lit + 3 * (opacity + 2 * (directed + 2 * casting)));
     char definitions[128];
     snprintf(definitions, sizeof definitions,
-             "#define COLOR_FORMAT %u\n#define LIT %u\n#define OPACITY %u\n#define DIRECTED %u\n", instance->color_format % 5,
-             lit, opacity, directed);
+             "#define COLOR_FORMAT %u\n#define LIT %u\n#define OPACITY %u\n#define DIRECTED %u\n#define CASTING %u\n",
+             instance->color_format % 5, lit, opacity, directed, casting);
     int result = pt_gl_kernel_program(d, PT_KERNEL_gather, variant, definitions);
     if (result != PATINA_OK)
         return result;
     if (lit)
-        pt_gl_set_lights(d, d->programs[PT_KERNEL_gather][variant], args);
+        pt_gl_set_scales(d, d->programs[PT_KERNEL_gather][variant], args);
     return pt_gl_points_of(d, work, variant);
 }
 

@@ -19,6 +19,7 @@ static const uint8_t instance_formats[] = {
     [PT_FIELD] = PT_FORMAT_field,       [PT_FIELD_ONE] = PT_FORMAT_field,    [PT_SCANS] = PT_FORMAT_scan,
     [PT_FINE_CHUNKS] = PT_FORMAT_chunk, [PT_FINER_CHUNKS] = PT_FORMAT_chunk, [PT_FINEST_CHUNKS] = PT_FORMAT_chunk,
 };
+static const uint8_t plan_formats[] = {[PT_PLAN_LIGHTS] = PT_FORMAT_light, [PT_PLAN_RAMPS] = PT_FORMAT_ramp};
 static const uint8_t mesh_formats[] = {
     [PT_MESH_VERTICES] = PT_FORMAT_vertex, [PT_MESH_INDICES] = PT_FORMAT_index, [PT_MESH_TEXELS] = PT_FORMAT_texel};
 
@@ -52,9 +53,10 @@ static uint32_t look_up(const struct pt_ref *ref, uint32_t level, enum pt_format
         return places_of(ref, level);
     }
     *format = ref->of == PT_OF_MESH   ? mesh_formats[ref->which]
+              : ref->of == PT_OF_PLAN ? plan_formats[ref->which]
               : ref->of == PT_OF_FLAG ? PT_FORMAT_flag
                                       : instance_formats[ref->which];
-    return ref->of == PT_OF_MESH ? PT_AT_mesh : PT_AT_cloud;
+    return ref->of == PT_OF_MESH ? PT_AT_mesh : ref->of == PT_OF_PLAN ? PT_AT_plan : PT_AT_cloud;
 }
 
 static int same(const struct pt_ref *a, const struct pt_ref *b)

@@ -74,14 +74,57 @@ static void set_height(const struct patina_scene *scene, const struct pt_instanc
         out->along[k] = (float)(translation[k] * slope);
 }
 
-static void set_ramp(const struct pt_instance *instance, struct recolor_args *out)
+// Room for `count` things of `size` bytes behind so many; NULL: memory lacks.
+static void *grown(struct pt_plan *plan, void *old, uint32_t held, uint32_t count, size_t size, uint32_t *room)
 {
-    static const float grey[6] = {0.0f, 0.0f, 0.0f, 1.0f, 1.0f, 1.0f};
-    out->entries = instance->style.ramp ? instance->style.ramp_count : 2;
-    memcpy(out->ramp, instance->style.ramp ? instance->style.ramp : grey, 3 * (size_t)out->entries * sizeof *out->ramp);
+    if (held + count <= *room)
+        return old;
+    const uint32_t wanted = 2 * (held + count);
+    void *memory = pt_arena_take(&plan->arena, wanted * size);
+    if (memory && held)
+        memcpy(memory, old, held * size);
+    *room = memory ? wanted : *room;
+    return memory;
 }
 
-void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_instance *planned, struct shade_args *args)
+static const struct pt_plan_ramp *known_ramp(const struct pt_plan *plan, const float *ramp, uint32_t entries)
+{
+    for (uint32_t i = 0; i < plan->ramp_count; i++)
+        if (plan->ramp_list[i].entries == entries &&
+            !memcmp(plan->ramps + 3 * (size_t)plan->ramp_list[i].first, ramp, 3 * (size_t)entries * sizeof *ramp))
+            return &plan->ramp_list[i];
+    return NULL;
+}
+
+void pt_plan_ramp(struct pt_builder *builder, const float *ramp, uint32_t entries, struct recolor_args *out)
+{
+    struct pt_plan *plan = builder->plan;
+    const struct pt_plan_ramp *known = known_ramp(plan, ramp, entries);
+    out->first = known ? known->first : plan->ramp_entries;
+    out->entries = entries;
+    if (known)
+        return;
+    float *ramps = grown(plan, plan->ramps, plan->ramp_entries, entries, 3 * sizeof *ramps, &plan->ramp_room);
+    struct pt_plan_ramp *list = grown(plan, plan->ramp_list, plan->ramp_count, 1, sizeof *list, &plan->ramp_list_room);
+    if (!ramps || !list) {
+        builder->failed = PATINA_ERROR_MEMORY;
+        return;
+    }
+    plan->ramps = ramps;
+    plan->ramp_list = list;
+    memcpy(ramps + 3 * (size_t)plan->ramp_entries, ramp, 3 * (size_t)entries * sizeof *ramp);
+    list[plan->ramp_count++] = (struct pt_plan_ramp){plan->ramp_entries, entries};
+    plan->ramp_entries += entries;
+}
+
+static void set_ramp(struct pt_builder *builder, const struct pt_instance *instance, struct recolor_args *out)
+{
+    static const float grey[6] = {0.0f, 0.0f, 0.0f, 1.0f, 1.0f, 1.0f};
+    const int own = instance->style.ramp != NULL;
+    pt_plan_ramp(builder, own ? instance->style.ramp : grey, own ? instance->style.ramp_count : 2, out);
+}
+
+void pt_plan_recolor(struct pt_builder *builder, const struct pt_plan_instance *planned, struct shade_args *args)
 {
     const struct pt_instance *instance = planned->instance;
     const patina_cloud_style *style = &instance->style;
@@ -98,7 +141,7 @@ void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_inst
     struct span span = span_of(builder->scene, instance);
     double slope = span.most != span.least ? 1.0 / (span.most - span.least) : 0.0;
     slope = fabs(slope) < 1e30 ? slope : 0.0;
-    set_ramp(instance, out);
+    set_ramp(builder, instance, out);
     out->source = style->color_source == PATINA_COLOR_SCALAR     ? PT_RAMP_SCALAR
                   : style->color_source == PATINA_COLOR_DISTANCE ? PT_RAMP_DISTANCE
                                                                  : PT_RAMP_PLACE;

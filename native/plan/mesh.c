@@ -125,12 +125,12 @@ void pt_plan_meshes(struct pt_builder *builder, int shown)
 }
 
 // One colour in place of images', whose opacity stays: of pixels, beside their colours, which a ramp of nothing else takes the place of.
-static void paper_with_holes(struct shade_args *args)
+static void paper_with_holes(struct pt_builder *builder, struct shade_args *args)
 {
+    const float *color = args->instance.color, twice[6] = {color[0], color[1], color[2], color[0], color[1], color[2]};
     args->instance.color_format = PT_COLOR_OF_PLANE;
-    args->recolor = (struct recolor_args){.source = PT_RAMP_PLACE, .entries = 2};
-    for (int k = 0; k < 6; k++)
-        args->recolor.ramp[k] = args->instance.color[k % 3];
+    args->recolor = (struct recolor_args){.source = PT_RAMP_PLACE};
+    pt_plan_ramp(builder, twice, 2, &args->recolor);
 }
 
 // unlit: those that light does not change.
@@ -143,7 +143,7 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
         blended |= in_view(&plan->meshes[i]) && plan->meshes[i].args.texture.blend;
     pt_shade_lights(builder, plan->mesh_shadows && !unlit, &args);
     if (unlit)
-        args.light_count = 0;
+        pt_without_lights(&args);
     // a point for each pixel, with its index as id
     args.instance = (struct instance_args){.id_base = unlit ? pixels_of(plan) : 0,
                                            .id_count = pixels_of(plan),
@@ -157,12 +157,13 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
                                            .opacity = 1.0f};
     pt_own_colors(color, &args);
     if (!pt_line_surface(builder, &args.instance) && args.instance.has_opacities)
-        paper_with_holes(&args);
+        paper_with_holes(builder, &args);
     struct pt_pass *pass = PT_ADD(
         builder, shade, args,
         {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0), pt_span_of(plan),
          pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder), pt_plane_at(color, 0), pt_nothing(),
-         unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS), pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
+         unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS), pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0),
+         pt_light_of(builder, &args), pt_ramps_of(&args)});
     pass->late = pt_shade_late(&args, PT_LATE_PIXELS);
     PT_REASON(pass, "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);
 }

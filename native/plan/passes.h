@@ -80,11 +80,14 @@ static inline uint32_t pt_bind_kind(enum pt_kind kind, uint32_t i, struct pt_ref
     return row->buffer_count;
 }
 
+static inline void pt_without_lights(struct shade_args *args) { args->light_count = args->light_types = args->casting = 0; }
 // Shading into UNLIT: as without lights.
 static inline void pt_own_colors(enum pt_plane color, struct shade_args *args)
 {
-    if (color == PT_PLANE_UNLIT)
-        args->instance.lit = args->light_count = args->blend = args->arrived = 0;
+    if (color != PT_PLANE_UNLIT)
+        return;
+    args->instance.lit = args->blend = args->arrived = 0;
+    pt_without_lights(args);
 }
 
 // Orthographic views see z = 0 so far before the camera's plane; view z = -(z + this).
@@ -164,7 +167,16 @@ int pt_mesh_pixels_shadowed(const struct pt_plan *plan);
 void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color);
 // shading.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
 void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args);
-enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words); // `words`, where some light's are read
+struct pt_ref pt_light_of(struct pt_builder *builder, const struct shade_args *args); // what a lit pass reads of them
+static inline struct pt_ref pt_ramps_of(const struct shade_args *args)
+{
+    return args->recolor.source ? (struct pt_ref){PT_OF_PLAN, PT_PLAN_RAMPS, 0} : pt_nothing();
+}
+// `words`, where some light's are read.
+static inline enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words)
+{
+    return args->casting ? words : PT_LATE_NOTHING;
+}
 // splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.
 void pt_plan_splat(struct pt_builder *builder);
 int pt_tells_surfaces(const struct pt_builder *builder); // the depth asked for is that of the surface

@@ -29,7 +29,8 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     args.view = pt_view_filled(plan, instance);
     args.instance = instance->args;
     const int shown = pt_line_surface(builder, &args.instance);
-    args.light_count = args.instance.lit ? args.light_count : 0;
+    if (!args.instance.lit)
+        pt_without_lights(&args);
     // filled pixels show their source's surface: half a spacing around, they border on the next source's
     double blend = floor(0.5 * plan->spacing_px + 0.5);
     uint32_t wants_normals = args.instance.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u) |
@@ -54,7 +55,8 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
                                    pt_span_of(plan), of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i),
                                    pt_shading_of(builder), pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i),
                                    args.of_pixels ? pt_plane_at(PT_PLANE_LIGHT, 0) : pt_buffer_of(PT_SHADOWS, instance->of),
-                                   pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
+                                   pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0), pt_light_of(builder, &args),
+                                   pt_ramps_of(&args)});
     pass->late = pt_shade_late(&args, PT_LATE_POINTS);
     PT_REASON(pass, "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
               args.instance.lit ? "lit" : "unlit", args.light_count, args.blend, args.recolor.source ? ", ramp" : "");

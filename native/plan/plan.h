@@ -161,6 +161,8 @@ enum { PT_RANGE_FINER = PT_FINEST_CHUNKS - PT_FINE_CHUNKS + 1 };
 
 enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
 
+enum pt_plan_buffer { PT_PLAN_LIGHTS, PT_PLAN_RAMPS, PT_PLAN_BUFFERS }; // of plan->light and plan->ramps
+
 // What of a pass's arguments is known only when its turn comes: how many samples shadow words hold, of points or of pixels.
 enum pt_late { PT_LATE_NOTHING, PT_LATE_POINTS, PT_LATE_PIXELS };
 
@@ -247,6 +249,11 @@ struct pt_soft_part {
     uint32_t records;
 };
 
+// Of plan->ramps.
+struct pt_plan_ramp {
+    uint32_t first, entries;
+};
+
 struct pt_plan_mesh {
     const struct pt_instance *instance;
     struct mesh_args args;
@@ -327,6 +334,11 @@ struct pt_plan {
     uint32_t skipped_count;
     struct pt_plan_light lights[PT_MAX_LIGHTS]; // those that cast, in the scene's order
     uint32_t light_count;
+    struct light_view *light; // all of it, as shading reads it; NULL: nothing is lit
+    float *ramps;             // of all that has one, a table; equal ones are there once
+    uint32_t ramp_entries, ramp_room;
+    struct pt_plan_ramp *ramp_list;
+    uint32_t ramp_count, ramp_list_room;
     uint64_t points, points_scattered, chunks, chunks_culled, chunks_clipped, chunks_cut;
     struct clip_view *clips; // of divided chunks, and for tint
     uint32_t clip_count, clip_room;
@@ -467,7 +479,9 @@ void pt_plan_tint(struct pt_builder *builder, enum pt_plane color); // passes on
 // ---- colours: color.c -------------------------------------------------------------------------------------------------
 
 // The instance's ramp, exposure and contrast, and the format of what shade reads for its colours.
-void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_instance *instance, struct shade_args *args);
+void pt_plan_recolor(struct pt_builder *builder, const struct pt_plan_instance *instance, struct shade_args *args);
+// Puts a ramp, of linear RGB, into the plan's table, unless it is there.
+void pt_plan_ramp(struct pt_builder *builder, const float *ramp, uint32_t entries, struct recolor_args *out);
 
 // ---- shadows: light.c -----------------------------------------------------------------------------------------------
 

@@ -6,7 +6,12 @@
 #include "shared/measured.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
+
+_Static_assert(offsetof(struct light_view, each) % 16 == 0 && sizeof(struct light_args) % 16 == 0 &&
+                   sizeof(struct light_view) <= 16384,
+               "lights lie as std140 has them, in a block that every driver takes");
 
 static void set_vector(const double axes[9], const double vector[3], float out[3])
 {
@@ -33,7 +38,7 @@ static void set_light(const struct patina_scene *scene, const patina_light_desc 
         for (int i = 0; i < PT_AREA_POINTS; i++) {
             for (int k = 0; k < 3; k++)
                 vector[k] = points[3 * i + k] - position[k];
-            set_vector(axes, vector, out->points + 3 * i);
+            set_vector(axes, vector, out->points[i]);
         }
     }
     double edge = pt_cos(0.5 * (double)light->cone);
@@ -44,24 +49,21 @@ static void set_light(const struct patina_scene *scene, const patina_light_desc 
         out->color[k] = (float)((double)light->color[k] * strength);
 }
 
-// receives: whether the instance's shadow words are there to be read.
-static void set_lights(const struct pt_plan *plan, const struct patina_scene *scene, int receives, struct shade_args *args)
+static void set_lights(const struct pt_plan *plan, const struct patina_scene *scene, struct light_view *out)
 {
     uint32_t casting = 0;
     for (uint32_t i = 0; i < scene->light_count; i++) { // patina_scene_add_light keeps them to PT_MAX_LIGHTS
-        struct light_args *out = &args->lights[args->light_count++];
-        set_light(scene, &scene->lights[i], out);
-        if (casting < plan->light_count && plan->lights[casting].light == &scene->lights[i] && ++casting && receives)
-            out->shadow = casting; // its scale is known late
+        set_light(scene, &scene->lights[i], &out->each[i]);
+        if (casting < plan->light_count && plan->lights[casting].light == &scene->lights[i])
+            out->each[i].shadow = ++casting;
     }
 }
 
 // world_light seen from the camera: its first three directions as a vector, the last five as a symmetric matrix, which turn.
-static void set_ambient(const struct patina_scene *scene, struct shade_args *args)
+static void set_ambient(const struct patina_scene *scene, struct light_view *out)
 {
     double axes[9], position[3];
-    args->directed = scene->settings.world_directed;
-    if (!args->directed)
+    if (!scene->settings.world_directed)
         return;
     pt_camera_axes(&scene->camera, axes, position);
     for (int c = 0; c < 3; c++) {
@@ -69,7 +71,7 @@ static void set_ambient(const struct patina_scene *scene, struct shade_args *arg
         const double along[3] = {world[1], world[2], world[3]}, xy = 0.5 * world[4], yz = 0.5 * world[5], zx = 0.5 * world[6];
         const double matrix[9] = {world[7] - world[8], xy, zx, xy, -world[7] - world[8], yz, zx, yz, 2.0 * world[8]};
         double turned[9], rows[9];
-        float *view = args->ambient + 9 * c;
+        float view[9];
         for (int k = 0; k < 3; k++)
             pt_apply(matrix, axes + 3 * k, rows + 3 * k);
         for (int k = 0; k < 3; k++)
@@ -81,6 +83,8 @@ static void set_ambient(const struct patina_scene *scene, struct shade_args *arg
         view[6] = (float)(2.0 * turned[2]);
         view[7] = (float)(0.5 * (turned[0] - turned[4]));
         view[8] = (float)(0.5 * turned[8]);
+        for (int k = 0; k < 9; k++)
+            out->ambient[k][c] = view[k];
     }
 }
 
@@ -88,22 +92,36 @@ void pt_shade_lights(const struct pt_builder *builder, int receives, struct shad
 {
     const struct patina_scene *scene = builder->scene;
     *args = (struct shade_args){.view = builder->plan->view};
-    memcpy(args->world, scene->settings.world_color, sizeof args->world);
-    set_ambient(scene, args);
+    args->directed = scene->settings.world_directed;
     args->eye_z = pt_eye_z(scene);
     args->arrived = builder->layer <= 1 && builder->plan->light_count && (scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
-    set_lights(builder->plan, scene, receives, args);
+    args->light_count = scene->light_count;
+    for (uint32_t i = 0; i < scene->light_count; i++)
+        args->light_types |= 1u << scene->lights[i].type;
+    args->casting = receives ? builder->plan->light_count : 0;
+}
+
+struct pt_ref pt_light_of(struct pt_builder *builder, const struct shade_args *args)
+{
+    const struct patina_scene *scene = builder->scene;
+    struct pt_plan *plan = builder->plan;
+    if (!args->instance.lit)
+        return pt_nothing();
+    if (!plan->light) {
+        struct light_view *light = pt_arena_take(&plan->arena, sizeof *light);
+        if (!light) {
+            builder->failed = PATINA_ERROR_MEMORY;
+            return pt_nothing();
+        }
+        memcpy(light->world, scene->settings.world_color, sizeof light->world);
+        set_ambient(scene, light);
+        set_lights(plan, scene, light);
+        plan->light = light;
+    }
+    return (struct pt_ref){PT_OF_PLAN, PT_PLAN_LIGHTS, 0};
 }
 
 // ---- what is known late --------------------------------------------------------------------------------------------------
-
-enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words)
-{
-    for (uint32_t i = 0; i < args->light_count; i++)
-        if (args->lights[i].shadow)
-            return words;
-    return PT_LATE_NOTHING;
-}
 
 // Of a sum of so many samples, what one of it is of all light.
 static float scale_of(uint32_t samples) { return 1.0f / (255.0f * (float)samples); }
@@ -116,10 +134,8 @@ static void set_blend(const uint32_t samples[PT_MAX_LIGHTS], struct blend_args *
 
 static void set_shade(const uint32_t samples[PT_MAX_LIGHTS], struct shade_args *args)
 {
-    for (uint32_t i = 0; i < args->light_count; i++)
-        if (args->lights[i].shadow)
-            args->lights[i].shadow_scale = args->of_pixels ? 1.0f / (float)PT_SHADOW_SUM
-                                                           : scale_of(samples[args->lights[i].shadow - 1]);
+    for (uint32_t i = 0; i < args->casting; i++)
+        args->scales[i] = args->of_pixels ? 1.0f / (float)PT_SHADOW_SUM : scale_of(samples[i]);
 }
 
 void pt_plan_late(const struct pt_pass *pass, const uint32_t samples[PT_MAX_LIGHTS], void *arguments)

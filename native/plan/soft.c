@@ -303,7 +303,8 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
         args.shade.instance.lit = 0;
     else
         pt_plan_recolor(builder, instance, &args.shade);
-    args.shade.light_count = args.shade.instance.lit ? args.shade.light_count : 0;
+    if (!args.shade.instance.lit)
+        pt_without_lights(&args.shade);
     const struct pt_soft_code code = pt_soft_code(
         instance->instance->cloud, style->soft == PATINA_SOFT_FIELD ? style->field : NULL, style->soft_radius > 0.0f);
     args.whole = code.whole;
@@ -315,13 +316,15 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
         args.weight = style->soft == PATINA_SOFT_FIELD ? fminf(1.0f / (style->soft_modulation * PT_FIELD_MOST), 1.0f)
                                                        : fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
     const enum pt_instance_buffer colors = args.shade.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
-    struct pt_ref refs[6 + PT_KIND_BUFFERS] = {pt_plane_at(PT_PLANE_SOFT_POINTS, 0)};
+    struct pt_ref refs[8 + PT_KIND_BUFFERS] = {pt_plane_at(PT_PLANE_SOFT_POINTS, 0)};
     uint32_t count = 1 + pt_bind_kind(PT_AS_SOFT, i, refs + 1);
     refs[count++] = pt_field_of(instance, i);
     refs[count++] = pt_buffer_of(colors, i);
     refs[count++] = pt_buffer_of(PT_OPACITIES, i);
     refs[count++] = late ? pt_buffer_of(PT_SHADOWS, instance->of) : pt_nothing();
     refs[count++] = args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
+    refs[count++] = pt_light_of(builder, &args.shade);
+    refs[count++] = pt_ramps_of(&args.shade);
     struct pt_pass *pass = pt_add(builder, PT_KERNEL_gather, "gather", &args, sizeof args, refs, count);
     pass->late = late;
     PT_REASON(pass, "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,

@@ -16,6 +16,7 @@ enum pt_ref_of {
     PT_OF_RECEIVER, // of a light's map: what is tested against it
     PT_OF_MESH,
     PT_OF_FLAG,    // one word: pt_flag
+    PT_OF_PLAN,    // what all its passes share: pt_plan_buffer
     PT_OF_NOTHING, // the kernel does not look at it
 };
 
@@ -23,7 +24,7 @@ enum pt_flag { PT_FLAG_DIFFERS, PT_FLAG_SOME, PT_FLAGS }; // see shadow_test, li
 
 struct pt_ref {
     enum pt_ref_of of;
-    uint32_t which; // pt_plane, pt_instance_buffer, pt_mesh_buffer or pt_flag
+    uint32_t which; // pt_plane, pt_instance_buffer, pt_mesh_buffer, pt_flag or pt_plan_buffer
     uint32_t index; // level, layer from 0 on, instance, receiver or mesh
 };
 

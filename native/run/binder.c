@@ -16,7 +16,7 @@ int pt_binder_open(struct pt_binder *binder)
     binder->meshes = calloc((size_t)plan->mesh_count + 1, sizeof *binder->meshes);
     if (!binder->instances || !binder->receivers || !binder->meshes)
         return pt_fail(&binder->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
-    return pt_clip_buffers_fill(binder->device, plan, binder->clips);
+    return pt_plan_buffers_fill(binder->device, plan, binder->own);
 }
 
 void pt_binder_close(struct pt_binder *binder)
@@ -188,13 +188,14 @@ int pt_bind(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer
     case PT_OF_MESH: return bind_mesh(binder, ref, out);
     case PT_OF_RECEIVER: return bind_receiver(binder, ref, out);
     case PT_OF_FLAG: *out = &binder->shadows->flags[ref->which]; return PATINA_OK;
+    case PT_OF_PLAN: *out = &binder->own->shared[ref->which]; return PATINA_OK;
     case PT_OF_NOTHING: *out = &binder->none; return PATINA_OK;
     case PT_OF_INSTANCE: break;
     }
     if (ref->which == PT_MARKS || ref->which == PT_SHADOWS)
         *out = pt_shadows_buffer(binder->shadows, ref->which, ref->index);
     else if (ref->which == PT_CLIPS || ref->which == PT_DRAWN)
-        *out = pt_clip_buffer(binder->clips, ref->which);
+        *out = pt_clip_buffer(binder->own, ref->which);
     else
         return bind_instance(binder, ref, out);
     return PATINA_OK;

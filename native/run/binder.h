@@ -4,7 +4,7 @@
 #ifndef PT_BINDER_H
 #define PT_BINDER_H
 
-#include "frame_clip.h"
+#include "plan_buffers.h"
 #include "planes.h"
 #include "residency.h"
 #include "shadows.h"
@@ -24,14 +24,14 @@ struct pt_binder {
     const struct pt_plan *plan;
     struct pt_residency *residency;
     struct pt_planes *planes, *picture; // of this plan; of the picture that it serves, or the same
-    struct pt_clip_buffers *clips;
+    struct pt_plan_buffers *own;
     struct pt_shadows *shadows;
     struct pt_bound_instance *instances, *receivers;
     struct pt_bound_mesh *meshes;
     struct pt_buffer none; // never written: kernels that bind it do not touch it
 };
 
-// The first six fields and shadows are set. Uploads the plan's clips. Messages are at the device, of this and what follows.
+// The first six fields and shadows are set. Uploads what the plan's passes share. Messages are at the device, of this and what follows.
 int pt_binder_open(struct pt_binder *binder);
 // The buffer of a reference, with room where it is a plane. *out lasts until the binder is closed.
 int pt_bind(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out);

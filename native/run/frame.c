@@ -60,7 +60,7 @@ void pt_frame_release(struct patina_frame *frame)
     pt_mean_destroy(frame);
     pt_planes_release(frame->device, &frame->planes);
     pt_shadows_release(frame->device, &frame->shadows);
-    pt_clip_buffers_release(frame->device, &frame->clips);
+    pt_plan_buffers_release(frame->device, &frame->own);
     pt_residency_release(&frame->residency, frame->device);
     pt_numbering_release(&frame->numbering);
 }

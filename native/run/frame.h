@@ -35,7 +35,7 @@ struct patina_frame {
     struct pt_planes planes;
     struct pt_shown shown;
     struct pt_shadows shadows;
-    struct pt_clip_buffers clips;
+    struct pt_plan_buffers own;
     uint32_t shadow_maps, shadow_size[2]; // of this render
     atomic_int cancel;
     _Atomic float progress;

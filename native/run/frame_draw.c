@@ -100,7 +100,7 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
                                                 .residency = &frame->residency,
                                                 .planes = &frame->planes,
                                                 .picture = &frame->planes,
-                                                .clips = &frame->clips,
+                                                .own = &frame->own,
                                                 .shadows = &frame->shadows}};
     frame->keys_valid = 0;
     link_planes(frame);

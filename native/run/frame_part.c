@@ -122,7 +122,7 @@ static struct pt_execution execution_of(struct part_job *job, struct pt_plan *pl
                                             .residency = &frame->residency,
                                             .planes = &job->planes,
                                             .picture = &job->planes,
-                                            .clips = plan->map ? &frame->shadows.clips : &frame->clips,
+                                            .own = plan->map ? &frame->shadows.own : &frame->own,
                                             .shadows = &frame->shadows}};
 }
 

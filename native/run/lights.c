@@ -29,7 +29,7 @@ static int run_plan(struct pt_execution *e, struct pt_plan *plan)
                                             .residency = e->binder.residency,
                                             .planes = &shadows->planes,
                                             .picture = e->binder.planes,
-                                            .clips = &shadows->clips,
+                                            .own = &shadows->own,
                                             .shadows = shadows}};
     const int error = pt_execute(&inner);
     pt_execution_close(&inner);

@@ -65,6 +65,10 @@ uint64_t pt_parts_digest(const struct patina_scene *scene, const struct pt_plan 
         hash = add_word(hash, (uint64_t)pass->kernel << 32 | pass->layer);
         hash = add(hash, pass->arguments, pass->argument_size);
     }
+    if (plan->light)
+        hash = add(hash, plan->light, sizeof *plan->light);
+    if (plan->ramps)
+        hash = add(hash, plan->ramps, 3 * (size_t)plan->ramp_entries * sizeof *plan->ramps);
     for (uint32_t i = 0; i < plan->instance_count; i++)
         hash = add(hash, plan->instances[i].chunks, plan->instances[i].chunk_count * sizeof *plan->instances[i].chunks);
     for (uint32_t i = 0; i < scene->cloud_count; i++)

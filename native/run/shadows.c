@@ -34,7 +34,7 @@ void pt_shadows_release(struct patina_device *device, struct pt_shadows *shadows
     pt_planes_release(device, &shadows->planes);
     for (int i = 0; i < PT_FLAGS; i++)
         device->ops->buffer_destroy(device, &shadows->flags[i]);
-    pt_clip_buffers_release(device, &shadows->clips);
+    pt_plan_buffers_release(device, &shadows->own);
     device->ops->buffer_destroy(device, &shadows->pixels.words);
 }
 

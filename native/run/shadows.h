@@ -3,7 +3,7 @@
 #ifndef PT_SHADOWS_H
 #define PT_SHADOWS_H
 
-#include "frame_clip.h"
+#include "plan_buffers.h"
 #include "planes.h"
 
 // What is known of a light's texture.
@@ -32,7 +32,7 @@ struct pt_shadows {
     struct pt_shadow_light lights[PT_MAX_LIGHTS]; // in the plan's order
     uint32_t light_count;
     struct pt_buffer flags[PT_FLAGS]; // one word each
-    struct pt_clip_buffers clips;     // of the map at hand
+    struct pt_plan_buffers own;       // of the map at hand
     struct pt_shadow_pixels pixels;
     struct pt_buffer none; // never written: kernels that bind it do not touch it
 };

@@ -2,7 +2,8 @@
 // gather: soft points of an instance -> records, lit: what their balls on screen are made of. SPEC 5, soft; twin of
 // native/device_cpu/kernels/gather.c
 //
-// A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). COLOR_FORMAT, OPACITY, LIT and DIRECTED are as in shade.comp.
+// A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). COLOR_FORMAT, OPACITY, LIT, CASTING and DIRECTED are as in
+// shade.comp.
 #version 430 core
 #include "shared/balls.h"
 #include "lib/math.glsl"
@@ -105,8 +106,7 @@ vec3 light(point p)
     precise vec3 unit = n * pt_rsqrt(known ? square : 1.0);
     float shadow;
     color = phong(view, args.eye_z, vec3(args.instance.ambient, args.instance.diffuse, args.instance.specular), args.instance.shininess,
-                  vec3(args.world[0], args.world[1], args.world[2]), p.id, args.instance.id_count,
-                  pixel(p.z, ray, known ? unit : vec3(0.0, 0.0, 1.0), color), shadow);
+                  p.id, args.instance.id_count, pixel(p.z, ray, known ? unit : vec3(0.0, 0.0, 1.0), color), shadow);
 #endif
     return color;
 }

@@ -4,8 +4,8 @@
 //
 // Normals and opacity: BLEND: of filled pixels over 3 x 3 pixels, kept while walking along a line; WIDE: over any window;
 // OPACITY 0: the instance's, 1: points have their own, 2: the colours' plane has it.
-// Colour, by COLOR_FORMAT and LIT (2: with highlights); LIGHTS: how many; PLAIN: only suns and points, and none casts;
-// RECOLOR: by a ramp, exposure, contrast. DIRECTED: ambient light differs by direction.
+// Colour, by COLOR_FORMAT and LIT (2: with highlights); LIGHTS: how many; PLAIN: only suns and points, and none casts; CASTING: shadow
+// words are read. RECOLOR: by a ramp, exposure, contrast. DIRECTED: ambient light differs by direction.
 // SHADING, ARRIVED: whether these planes are written.
 #version 430 core
 #include "shared/colors.h"
@@ -158,7 +158,6 @@ void main()
     float instance_opacity = args.instance.opacity, eye_z = args.eye_z;
     vec3 factors = vec3(args.instance.ambient, args.instance.diffuse, args.instance.specular);
     vec3 style = vec3(args.instance.color[0], args.instance.color[1], args.instance.color[2]);
-    vec3 world = vec3(args.world[0], args.world[1], args.world[2]);
     ivec2 size = ivec2(view.width, view.height);
     uvec2 here = pt_tile_line(view);
     uint left = pt_tile_steps(view, here);
@@ -203,7 +202,7 @@ void main()
             float shadow = 1.0;
 #if LIT
             bool of_pixels = args.of_pixels != 0u;
-            vec3 c = phong(view, eye_z, factors, shininess, world, of_pixels ? own.source : id,
+            vec3 c = phong(view, eye_z, factors, shininess, of_pixels ? own.source : id,
                            of_pixels ? view.width * view.height : id_count, p, shadow);
 #else
             vec3 c = p.albedo;

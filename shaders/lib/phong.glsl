@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light on a point [D 3.1]: steps of shade and gather; twin of native/device_cpu/kernels/shade.h. Include it behind args, a struct
-// shade_args, and shadows; LIT, LIGHTS, PLAIN and DIRECTED are as in shade.comp.
+// Light on a point [D 3.1]: steps of shade and gather; twin of native/device_cpu/kernels/shade.h. Include it behind shadows; LIT,
+// LIGHTS, PLAIN, CASTING and DIRECTED are as in shade.comp.
 #ifndef PT_PHONG_GLSL
 #define PT_PHONG_GLSL
 
@@ -12,7 +12,8 @@ struct pixel {
     vec3 n, albedo;
 };
 
-layout(location = 16) uniform vec4 lights[3 * PT_MAX_LIGHTS]; // colour and type; vector; cone, shadow and its scale
+layout(std140, binding = UNIFORM_lights) uniform lights_block { light_view lights; };
+layout(location = 16) uniform float scales[PT_MAX_LIGHTS]; // as in shade_args
 
 float power(float x, uint exponent)
 {
@@ -40,13 +41,12 @@ vec3 towards(uint light, uint type, vec3 from, vec3 point, inout float falloff)
 #else
     if (type == 2u) // PATINA_LIGHT_POINT
         return l;
-    vec3 axis = vec3(args.lights[light].axis[0], args.lights[light].axis[1], args.lights[light].axis[2]);
-    float cosine = 0.0 - pt_dot(axis, l);
+    float cosine = 0.0 - pt_dot(lights.each[light].axis, l);
     if (type == 4u) { // PATINA_LIGHT_AREA: one side shines, as matt paper
         falloff = falloff * pt_max(cosine, 0.0);
         return l;
     }
-    vec4 cone = lights[3u * light + 2u];
+    vec2 cone = lights.each[light].cone.xy;
     float edge = pt_min(pt_max((cosine - cone.x) * cone.y, 0.0), 1.0);
     falloff = falloff * ((edge * edge) * (3.0 - 2.0 * edge));
     return l;
@@ -56,7 +56,7 @@ vec3 towards(uint light, uint type, vec3 from, vec3 point, inout float falloff)
 void add_light(uint light, uint type, vec3 from, float share, uint shininess, vec3 n, vec3 point, vec3 to_eye,
                inout vec3 diffuse, inout vec3 specular)
 {
-    vec3 color_of_light = lights[3u * light].xyz;
+    vec3 color_of_light = lights.each[light].color;
     precise float falloff = 0.31830988618; // 1 / pi: radiance of a white Lambert surface under unit irradiance
     precise vec3 l = towards(light, type, from, point, falloff);
     falloff = falloff * share;
@@ -74,12 +74,11 @@ void add_light(uint light, uint type, vec3 from, float share, uint shininess, ve
 }
 
 #if DIRECTED
-float ambient_of(uint k, vec3 n)
+float ambient_of(uint c, vec3 n)
 {
-    precise float low = (args.ambient[k] + args.ambient[k + 1u] * n.x) + (args.ambient[k + 2u] * n.y + args.ambient[k + 3u] * n.z);
-    precise float mixed = (args.ambient[k + 4u] * (n.x * n.y) + args.ambient[k + 5u] * (n.y * n.z)) +
-                          args.ambient[k + 6u] * (n.z * n.x);
-    precise float square = args.ambient[k + 7u] * (n.x * n.x - n.y * n.y) + args.ambient[k + 8u] * (3.0 * (n.z * n.z) - 1.0);
+    precise float low = (lights.ambient[0][c] + lights.ambient[1][c] * n.x) + (lights.ambient[2][c] * n.y + lights.ambient[3][c] * n.z);
+    precise float mixed = (lights.ambient[4][c] * (n.x * n.y) + lights.ambient[5][c] * (n.y * n.z)) + lights.ambient[6][c] * (n.z * n.x);
+    precise float square = lights.ambient[7][c] * (n.x * n.x - n.y * n.y) + lights.ambient[8][c] * (3.0 * (n.z * n.z) - 1.0);
     precise float sum = (low + mixed) + square;
     return pt_max(sum, 0.0);
 }
@@ -87,8 +86,7 @@ float ambient_of(uint k, vec3 n)
 
 // c = albedo (k_a world + k_d sum m E max(n.l, 0) / pi) + albedo k_s sum m E max(r.v, 0)^shininess / pi, m what arrives of
 // the light. word: which is the point's, of those of a light, which lie `stride` apart. shadow: the mean m of lights that cast.
-vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world, uint word, uint stride, pixel p,
-           out float shadow)
+vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, uint word, uint stride, pixel p, out float shadow)
 {
     precise vec3 point = vec3(p.ray, pt_negate(p.z + eye_z));
     precise vec3 to_eye = vec3(0.0, 0.0, 1.0);
@@ -104,30 +102,32 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
     precise float sum = 0.0;
     uint casting = 0u;
     for (uint i = 0u; i < LIGHTS; i++) {
-        uint type = uint(lights[3u * i].w);
+        uint type = lights.each[i].type;
         precise float share = 1.0;
 #if PLAIN
-        add_light(i, type, lights[3u * i + 1u].xyz, share, shininess, n, point, to_eye, diffuse, specular);
+        add_light(i, type, lights.each[i].vector, share, shininess, n, point, to_eye, diffuse, specular);
 #else
-        vec4 extra = lights[3u * i + 2u];
-        if (extra.z != 0.0) {
-            uint lost = shadows[(uint(extra.z) - 1u) * stride + word] & PT_SHADOW_SUM;
-            share = 1.0 - float(lost) * extra.w;
+#if CASTING
+        uint own = lights.each[i].shadow;
+        if (own != 0u) {
+            uint lost = shadows[(own - 1u) * stride + word] & PT_SHADOW_SUM;
+            share = 1.0 - float(lost) * scales[own - 1u];
             sum = sum + share;
             casting++;
         }
+#endif
         if (type != 4u)
-            add_light(i, type, lights[3u * i + 1u].xyz, share, shininess, n, point, to_eye, diffuse, specular);
+            add_light(i, type, lights.each[i].vector, share, shininess, n, point, to_eye, diffuse, specular);
         for (uint j = 0u; type == 4u && j < PT_AREA_POINTS; j++)
-            add_light(i, type, vec3(args.lights[i].points[3u * j], args.lights[i].points[3u * j + 1u],
-                                    args.lights[i].points[3u * j + 2u]),
-                      share, shininess, n, point, to_eye, diffuse, specular);
+            add_light(i, type, lights.each[i].points[j].xyz, share, shininess, n, point, to_eye, diffuse, specular);
 #endif
     }
     precise float mean = sum / float(casting);
     shadow = casting != 0u ? mean : 1.0;
 #if DIRECTED
-    world = vec3(ambient_of(0u, n), ambient_of(9u, n), ambient_of(18u, n));
+    vec3 world = vec3(ambient_of(0u, n), ambient_of(1u, n), ambient_of(2u, n));
+#else
+    vec3 world = lights.world;
 #endif
     precise vec3 light = factors.x * world + factors.y * diffuse;
     precise vec3 total = p.albedo * (light + factors.z * specular);

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Colours of points from a ramp, exposure and contrast: a step of shade; twin of native/device_cpu/kernels/recolor.h
+// Colours of points from a ramp, exposure and contrast: a step of shade and gather; twin of native/device_cpu/kernels/recolor.h.
+// Include it behind args, a struct shade_args.
 #ifndef PT_RECOLOR_GLSL
 #define PT_RECOLOR_GLSL
 
 #include "shared/colors.h"
+
+layout(std430, binding = BIND_ramps) readonly buffer ramps_block { float ramps[]; };
 
 // Where a pixel lies on the ramp.
 float place_on_ramp(view_args view, float eye_z, vec2 ray, float z, float scalar)
@@ -28,7 +31,8 @@ float place_on_ramp(view_args view, float eye_z, vec2 ray, float z, float scalar
 
 vec3 ramp_entry(uint i)
 {
-    return vec3(args.recolor.ramp[3u * i], args.recolor.ramp[3u * i + 1u], args.recolor.ramp[3u * i + 2u]);
+    uint at = 3u * (args.recolor.first + i);
+    return vec3(ramps[at], ramps[at + 1u], ramps[at + 2u]);
 }
 
 vec3 ramp_color(float t)

@@ -22,16 +22,24 @@
 #define PT_MAX_LIGHTS 32
 #define PT_AREA_POINTS 16 // of an area light, where shading gathers its light
 
-// Lights in view space.
+// A light in view space.
 struct light_args {
+    pt_vec3 color;     // sun: irradiance; point, spot: radiant intensity (W/sr); area: the same of one of its points, head-on
     uint32_t type;     // patina_light_type
-    float color[3];    // sun: irradiance; point, spot: radiant intensity (W/sr); area: the same of one of its points, head-on
-    float vector[3];   // sun: unit, towards the light; others: position
-    float axis[3];     // spot, area: unit, the way the light travels
-    float cone[2];     // spot: cosine of the half angle; 1 / how far above it the cosine is when the edge has faded
-    uint32_t shadow;   // 1 + its place among the instance's shadow words; 0: casts none, or the instance receives none
-    float shadow_scale; // of a word's sum: 1 / (255 samples)
-    float points[3 * PT_AREA_POINTS]; // area: positions
+    pt_vec3 vector;    // sun: unit, towards the light; others: position
+    uint32_t shadow;   // 1 + its place among the lights that cast shadows, as their words lie; 0: casts none
+    pt_vec3 axis;      // spot, area: unit, the way the light travels
+    float unused;
+    pt_vec4 cone;      // spot: cosine of the half angle; 1 / how far above it the cosine is when the edge has faded
+    pt_vec4 points[PT_AREA_POINTS]; // area: positions
+};
+
+// The light of a picture, one for all its instances: that of the world and those of the lights, as the view sees them.
+struct light_view {
+    pt_vec3 world;      // ambient radiance; with `directed` for nothing
+    uint32_t unused;
+    pt_vec4 ambient[9]; // directed: [k][c]: c = 0..2, k = 0..8: 1, x, y, z, xy, yz, zx, x^2 - y^2, 3 z^2 - 1
+    struct light_args each[PT_MAX_LIGHTS];
 };
 
 // shade: a ramp's colour in place of the point's, then exposure and contrast.
@@ -45,8 +53,7 @@ struct recolor_args {
     uint32_t graded;
     float along[3], zero;
     float gain, contrast;
-    uint32_t entries; // 2..PT_RAMP_MOST
-    float ramp[3 * PT_RAMP_MOST];
+    uint32_t first, entries; // in the table of the picture's ramps; 2..PT_RAMP_MOST of them
 };
 
 // shade: id -> colour, normal, Phong. [D 3.1], deferred. A filled pixel's normal (SPEC 2.2, refined) is the blend, over the
@@ -56,15 +63,14 @@ struct recolor_args {
 struct shade_args {
     struct view_args view;
     struct instance_args instance;
-    float world[3];     // ambient radiance; with `directed` for nothing
-    uint32_t directed;  // 1: ambient radiance is max(sum of ambient[c][k] b_k(n), 0), n in view space, turned to the eye
-    float ambient[27];  // c = 0..2, k = 0..8: 1, x, y, z, xy, yz, zx, x^2 - y^2, 3 z^2 - 1
+    uint32_t directed;  // 1: ambient radiance is max(sum of ambient[k][c] b_k(n), 0), n in view space, turned to the eye
     float eye_z;        // orthographic: near, so that view z = -(z + near); perspective: 0
     uint32_t blend;     // the window's radius at most, 0..8
     uint32_t arrived;   // 1: written
     uint32_t of_pixels; // 1: shadow words are those that discs blended to, of the pixel where the surface was measured
-    uint32_t light_count;
-    struct light_args lights[PT_MAX_LIGHTS];
+    uint32_t light_count, light_types; // of light_view; bits 1 << those that are among them
+    uint32_t casting;             // so many of them have shadow words that are read; 0: the instance receives no shadows
+    float scales[PT_MAX_LIGHTS];  // of the sums of these words, as light_args.shadow counts: 1 / (255 samples)
     struct recolor_args recolor;
 };
 

@@ -8,8 +8,12 @@
 #ifdef GL_core_profile
 #define uint32_t uint
 #define int32_t int
+#define pt_vec3 vec3
+#define pt_vec4 vec4
 #else
 #include <stdint.h>
+// Of uniform blocks (std140): each lies at a multiple of 16 bytes, and behind three floats comes one word more.
+typedef float pt_vec3[3], pt_vec4[4];
 #endif
 
 // Effective layer distance (SPEC 1): d_eff = max(d_min, K spacing, footprint, 4 ulp(z)) / max(|n.v|, C).

@@ -12,6 +12,8 @@ enum { SIZES = sizeof sizes / sizeof sizes[0] };
 struct setup {
     struct scene scene;
     struct gather_args args;
+    struct light_view lights;
+    float ramps[9]; // the instance's is its last two
     uint32_t *field, *drawn, *shadows, records;
     void *colors;
     size_t colors_size;
@@ -31,11 +33,14 @@ static uint32_t field_word(double f, double radius)
     return (uint32_t)(f * (double)PT_FIELD_MOST + 0.5) << PT_FIELD_SHIFT | (float_bits(radius) >> 15 & PT_FIELD_RADIUS);
 }
 
-static void set_lights(struct rng *rng, struct shade_args *args, uint32_t count)
+static void set_lights(struct rng *rng, struct setup *s, uint32_t count)
 {
+    struct shade_args *args = &s->args.shade;
     args->light_count = count;
+    args->casting = 2;
+    args->scales[0] = args->scales[1] = 1.0f / (255.0f * 8.0f);
     for (uint32_t i = 0; i < count; i++) {
-        struct light_args *light = &args->lights[i];
+        struct light_args *light = &s->lights.each[i];
         light->type = i % 3 == 2 ? 3 : i % 2 ? 2 : 1;
         rng_direction(rng, light->vector);
         rng_direction(rng, light->axis);
@@ -46,7 +51,7 @@ static void set_lights(struct rng *rng, struct shade_args *args, uint32_t count)
             light->vector[c] *= i % 3 ? 9.0f : 1.0f;
         }
         light->shadow = i < 2 ? i + 1 : 0;
-        light->shadow_scale = 1.0f / (255.0f * 8.0f);
+        args->light_types |= 1u << light->type;
     }
 }
 
@@ -66,7 +71,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, ui
                                   .opacity = 0.8f,
                                   .within = 1,
                                   .radius_step = 1u << 15};
-    s.args.shade.world[0] = s.args.shade.world[1] = s.args.shade.world[2] = 0.5f;
+    s.lights.world[0] = s.lights.world[1] = s.lights.world[2] = 0.5f;
     *instance = (struct instance_args){.id_base = 70,
                                        .id_count = cloud->slots,
                                        .has_normals = 1,
@@ -158,11 +163,17 @@ static uint32_t run(struct harness *h, const struct setup *s)
                 harness_buffer(h, s->field, 4 * slots),
                 instance->color_format ? harness_buffer(h, s->colors, s->colors_size) : NULL,
                 instance->has_opacities ? harness_buffer(h, s->opacities, (slots + 3) / 4 * 4) : NULL,
-                harness_buffer(h, s->shadows, 8 * slots), s->drawn ? harness_buffer(h, s->drawn, slots) : NULL);
+                harness_buffer(h, s->shadows, 8 * slots), s->drawn ? harness_buffer(h, s->drawn, slots) : NULL,
+                instance->lit ? harness_buffer(h, &s->lights, sizeof s->lights) : NULL,
+                s->args.shade.recolor.source ? harness_buffer(h, s->ramps, sizeof s->ramps) : NULL);
     const float *got = harness_read(h, points);
     harness_same(h, "records", got, (size_t)PT_SOFT_WORDS * s->records, 4, PT_SOFT_WORDS, s->records);
-    const struct ref_planes planes = {
-        .surfels = cloud->surfels, .colors = s->colors, .opacities = s->opacities, .shadows = s->shadows};
+    const struct ref_planes planes = {.surfels = cloud->surfels,
+                                      .colors = s->colors,
+                                      .opacities = s->opacities,
+                                      .shadows = s->shadows,
+                                      .lights = &s->lights,
+                                      .ramps = s->ramps};
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].padded; i++) {
             const float *record = got + PT_SOFT_WORDS * (size_t)(cloud->chunks[c].record + i);
@@ -181,7 +192,7 @@ static void formats(struct harness *h)
         for (int perspective = 0; perspective < 2; perspective++) {
             struct rng rng = {31 + format};
             struct setup s = make(h, &rng, perspective, format, 4.0, 0.01, 0.3);
-            set_lights(&rng, &s.args.shade, 3);
+            set_lights(&rng, &s, 3);
             points_pad(&s.scene.clouds[0]);
             s.args.shade.instance.has_opacities = format == 1;
             s.args.weight = format == 2 ? 1.0f / 30000.0f : 0.0f;
@@ -191,7 +202,7 @@ static void formats(struct harness *h)
         }
 }
 
-static void unlit_and_directed(struct harness *h)
+static void unlit_directed_and_a_ramp(struct harness *h)
 {
     struct rng rng = {41};
     struct setup s = make(h, &rng, 1, 2, 4.0, 0.01, 0.3);
@@ -202,8 +213,14 @@ static void unlit_and_directed(struct harness *h)
     s.args.shade.instance.lit = s.args.shade.directed = 1;
     s.args.shade.instance.specular = 0.0f;
     for (int k = 0; k < 27; k++)
-        s.args.shade.ambient[k] = (float)rng_range(&rng, 0.0, 0.3);
+        s.lights.ambient[k % 9][k / 9] = (float)rng_range(&rng, 0.0, 0.3);
     run(h, &s);
+    s.args.shade.recolor = (struct recolor_args){
+        .source = PT_RAMP_DISTANCE, .along = {0.3f}, .zero = 3.0f, .first = 1, .entries = 2};
+    for (int k = 0; k < 9; k++)
+        s.ramps[k] = (float)rng_unit(&rng);
+    s.args.shade.instance.color_format = 0;
+    HARNESS_CHECK(h, run(h, &s) > 100);
 }
 
 // Radii from 1e-3 to 1e3, and clouds as large.
@@ -212,7 +229,7 @@ static void radii(struct harness *h)
     for (int perspective = 0; perspective < 2; perspective++) {
         struct rng rng = {51};
         struct setup s = make(h, &rng, perspective, 2, 4.0, 1e-3, 1e3);
-        set_lights(&rng, &s.args.shade, 1);
+        set_lights(&rng, &s, 1);
         points_pad(&s.scene.clouds[0]);
         HARNESS_CHECK(h, run(h, &s) > 100);
     }
@@ -224,7 +241,7 @@ static void words(struct harness *h)
     for (uint32_t whole = 0; whole < 2; whole++) {
         struct rng rng = {81 + whole};
         struct setup s = make(h, &rng, 1, 2, 4.0, 0.05, 0.3);
-        set_lights(&rng, &s.args.shade, 1);
+        set_lights(&rng, &s, 1);
         points_pad(&s.scene.clouds[0]);
         s.args.whole = whole;
         s.args.radius_step = whole ? 1 : (float_bits(0.3) - float_bits(0.05)) / (PT_FIELD_RADIUS - 1) + 1;
@@ -245,7 +262,7 @@ static void about_the_eye(struct harness *h)
     for (uint32_t within = 0; within < 2; within++) {
         struct rng rng = {61};
         struct setup s = make(h, &rng, 1, 2, 0.2, 0.05, 3.0);
-        set_lights(&rng, &s.args.shade, 2);
+        set_lights(&rng, &s, 2);
         points_pad(&s.scene.clouds[0]);
         s.args.within = within;
         drawn[within] = run(h, &s);
@@ -259,7 +276,7 @@ static void ends(struct harness *h)
     struct rng rng = {71};
     struct setup s = make(h, &rng, 1, 0, 4.0, 0.05, 0.3);
     struct cloud *cloud = &s.scene.clouds[0];
-    set_lights(&rng, &s.args.shade, 1);
+    set_lights(&rng, &s, 1);
     const float none[] = {NAN, INFINITY, -INFINITY, 3e38f};
     for (uint32_t i = 0; i < 64; i++)
         *points_coordinate(cloud, 5, i, (int)(i % 3)) = none[i % 4];
@@ -288,7 +305,7 @@ static void ends(struct harness *h)
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"formats of colours", formats, 0},   {"unlit, directed", unlit_and_directed, 0},
+        {"formats of colours", formats, 0},   {"unlit, directed, a ramp", unlit_directed_and_a_ramp, 0},
         {"radii from 1e-3 to 1e3", radii, 0}, {"words", words, 0},
         {"about the eye", about_the_eye, 0},  {"ends", ends, 0},
     };

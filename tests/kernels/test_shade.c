@@ -8,7 +8,9 @@
 
 struct setup {
     struct picture picture;
-    struct shade_args args;
+    struct shade_args args; // light_types as the lights are: check
+    struct light_view lights;
+    float ramps[3 * (PT_RAMP_MOST + 1)]; // the instance's is behind an entry of another's
     void *colors;
     size_t colors_size;
     uint8_t *opacities;
@@ -45,7 +47,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
         s.colors_size = ((size_t)instance->id_count * 3 + 3) / 4 * 4;
     for (int c = 0; c < 3; c++) {
         instance->color[c] = (float)rng_unit(rng);
-        s.args.world[c] = (float)rng_unit(rng);
+        s.lights.world[c] = (float)rng_unit(rng);
     }
     s.shadows = harness_alloc(h, s.picture.count * 8);
     for (size_t i = 0; i < (size_t)instance->id_count * 2; i++)
@@ -53,7 +55,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     s.args.arrived = format != 1;
     s.args.light_count = 4;
     for (uint32_t i = 0; i < s.args.light_count; i++) {
-        struct light_args *light = &s.args.lights[i];
+        struct light_args *light = &s.lights.each[i];
         light->type = i % 2 ? 2 : 1;
         rng_direction(rng, light->vector);
         for (int c = 0; c < 3; c++) {
@@ -69,7 +71,13 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     return s;
 }
 
-static void check(struct harness *h, const struct setup *s, double most_open)
+static void cast_by_points(struct setup *s) // by two of the lights, at most
+{
+    s->args.casting = 2;
+    s->args.scales[0] = s->args.scales[1] = 1.0f / (255.0f * 8.0f);
+}
+
+static void check(struct harness *h, struct setup *s, double most_open)
 {
     const struct picture *picture = &s->picture;
     size_t count = picture->count, open = 0;
@@ -85,12 +93,20 @@ static void check(struct harness *h, const struct setup *s, double most_open)
     struct pt_buffer *shading = harness_buffer(h, s->shading, count * 16);
     struct pt_buffer *color = harness_buffer(h, unset, count * 16), *arrived = harness_buffer(h, unset, count * 4);
     struct pt_buffer *opacities = harness_buffer(h, s->opacities, s->opacities ? s->args.instance.id_count : 0);
-    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color, opacities, shadows, arrived);
+    struct pt_buffer *lights = s->args.instance.lit ? harness_buffer(h, &s->lights, sizeof s->lights) : NULL;
+    struct pt_buffer *ramps = s->args.recolor.source ? harness_buffer(h, s->ramps, sizeof s->ramps) : NULL;
+    s->args.light_types = 0;
+    for (uint32_t i = 0; i < s->args.light_count; i++)
+        s->args.light_types |= 1u << s->lights.each[i].type;
+    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color, opacities, shadows, arrived, lights,
+                ramps);
     const float *got = harness_read(h, color), *got_n = harness_read(h, shading), *got_share = harness_read(h, arrived);
     struct ref_planes planes = picture_planes(picture);
     planes.colors = s->colors;
     planes.shadows = s->shadows;
     planes.opacities = s->opacities;
+    planes.lights = &s->lights;
+    planes.ramps = s->ramps;
     float *transparent = harness_alloc(h, count * 4);
     const struct ref_shade *kept = harness_kept(h); // the first device's reference serves the others
     struct ref_shade *all = kept ? NULL : harness_alloc(h, count * sizeof *all);
@@ -226,11 +242,11 @@ static void lights(struct harness *h)
     s.args.light_count = 0;
     check(h, &s, TOL_UNSURE_SHARE);
     s.args.light_count = PT_MAX_LIGHTS;
+    cast_by_points(&s);
     for (uint32_t i = 0; i < PT_MAX_LIGHTS; i++) {
-        struct light_args *light = &s.args.lights[i];
+        struct light_args *light = &s.lights.each[i];
         light->type = 1 + i % 2;
         light->shadow = i % 3; // none, the first, the second
-        light->shadow_scale = 1.0f / (255.0f * 8.0f);
         rng_direction(&rng, light->vector);
         for (int c = 0; c < 3; c++) {
             light->color[c] = (float)rng_unit(&rng);
@@ -238,16 +254,18 @@ static void lights(struct harness *h)
         }
     }
     check(h, &s, TOL_UNSURE_SHARE);
+    s.args.casting = 0; // an instance that receives none
+    check(h, &s, TOL_UNSURE_SHARE);
     s.args.light_count = 1;
-    s.args.lights[0].type = 2;
+    s.lights.each[0].type = 2;
     for (size_t i = 0; i < s.picture.count; i += 97) { // exactly at a point
         if (s.picture.keys[i] == REF_EMPTY_KEY)
             continue;
         struct ref_ray ray = ref_ray(&s.args.view, (int)(i % 67), (int)(i / 67));
         double z = ref_key_z(s.picture.keys[i]);
-        s.args.lights[0].vector[0] = (float)(ray.u * z);
-        s.args.lights[0].vector[1] = (float)(ray.v * z);
-        s.args.lights[0].vector[2] = (float)-z;
+        s.lights.each[0].vector[0] = (float)(ray.u * z);
+        s.lights.each[0].vector[1] = (float)(ray.v * z);
+        s.lights.each[0].vector[2] = (float)-z;
         check(h, &s, TOL_UNSURE_SHARE);
     }
 }
@@ -258,16 +276,17 @@ static void shapes(struct harness *h)
     for (uint64_t seed = 10; seed < 16; seed++) {
         struct rng rng = {seed};
         struct setup s = make(h, &rng, seed % 2 ? 1 : 0, PICTURE_SURFACES, 0);
+        if (seed % 3)
+            cast_by_points(&s);
         for (uint32_t i = 0; i < s.args.light_count; i++) {
-            struct light_args *light = &s.args.lights[i];
+            struct light_args *light = &s.lights.each[i];
             light->type = 3 + i % 2;
             light->shadow = (uint32_t)seed % 3;
-            light->shadow_scale = 1.0f / (255.0f * 8.0f);
             rng_direction(&rng, light->axis);
             light->cone[0] = (float)rng_range(&rng, 0.0, 0.9);
             light->cone[1] = (float)rng_range(&rng, 1.0, 20.0);
             for (int k = 0; k < 3 * PT_AREA_POINTS; k++)
-                light->points[k] = light->vector[k % 3] + (float)rng_range(&rng, -0.3, 0.3);
+                light->points[k / 3][k % 3] = light->vector[k % 3] + (float)rng_range(&rng, -0.3, 0.3);
         }
         check(h, &s, TOL_UNSURE_SHARE);
     }
@@ -283,10 +302,10 @@ static void pixels(struct harness *h)
         s.args.blend = seed % 3;
         for (size_t i = 0; i < 2 * s.picture.count; i++)
             s.shadows[i] = rng_below(&rng, 4) ? rng_below(&rng, PT_SHADOW_SUM + 1) : i % 2 ? PT_SHADOW_SUM : 0;
-        for (uint32_t i = 0; i < s.args.light_count; i++) {
-            s.args.lights[i].shadow = i % 3;
-            s.args.lights[i].shadow_scale = 1.0f / (float)PT_SHADOW_SUM;
-        }
+        for (uint32_t i = 0; i < s.args.light_count; i++)
+            s.lights.each[i].shadow = i % 3;
+        s.args.casting = 2;
+        s.args.scales[0] = s.args.scales[1] = 1.0f / (float)PT_SHADOW_SUM;
         check(h, &s, TOL_UNSURE_SHARE);
     }
 }
@@ -299,7 +318,7 @@ static void directed(struct harness *h)
         struct setup s = make(h, &rng, seed % 2 ? 1 : 0, seed < 24 ? PICTURE_SURFACES : PICTURE_NOISE, 2);
         s.args.directed = 1;
         for (int k = 0; k < 27; k++)
-            s.args.ambient[k] = (float)rng_range(&rng, -1.0, 1.0) * (seed % 3 ? 1.0f : 50.0f);
+            s.lights.ambient[k % 9][k / 9] = (float)rng_range(&rng, -1.0, 1.0) * (seed % 3 ? 1.0f : 50.0f);
         s.args.light_count = seed % 4 ? s.args.light_count : 0;
         s.args.instance.specular = seed % 2 ? 0.5f : 0.0f;
         s.args.blend = seed % 3 ? 1 : 2;
@@ -321,6 +340,7 @@ static void ramps(struct harness *h)
             s.args.instance.color_format = scalar ? PT_COLOR_OF_SCALAR : source > 1 ? 0 : s.args.instance.color_format;
             s.args.instance.lit = i % 3 == 0;
             recolor->source = source;
+            recolor->first = i % 2;
             recolor->entries = entries[i % 3];
             recolor->graded = i > 1;
             recolor->gain = i == 2 ? 8.0f : i == 5 ? 0.125f : 1.0f;
@@ -329,7 +349,7 @@ static void ramps(struct harness *h)
                 recolor->along[k] = (float)rng_range(&rng, -0.4, 0.4);
             recolor->zero = scalar ? -4.0f : source == PT_RAMP_DISTANCE ? 2.0f : 0.3f;
             for (uint32_t k = 0; k < 3 * recolor->entries; k++)
-                recolor->ramp[k] = (float)rng_unit(&rng);
+                s.ramps[3 * recolor->first + k] = (float)rng_unit(&rng);
             for (uint32_t k = 0; k < s.args.instance.id_count && scalar; k++)
                 ((float *)s.colors)[k] = k % 50 == 7   ? NAN
                                          : k % 50 == 8 ? INFINITY
@@ -348,14 +368,10 @@ static void ramp_sanity(struct harness *h)
     struct shade_args args = {.view = {.width = 1, .height = 1}};
     args.instance = (struct instance_args){
         .id_count = 1, .opacity = 1.0f, .color_format = PT_COLOR_OF_SCALAR, .color = {0.9f, 0.1f, 0.1f}};
-    args.recolor = (struct recolor_args){.source = PT_RAMP_SCALAR,
-                                         .along = {0.5f},
-                                         .zero = 2.0f,
-                                         .entries = 2,
-                                         .gain = 1.0f,
-                                         .contrast = 1.0f,
-                                         .ramp = {0, 0, 0, 1, 1, 1}};
-    struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff, .colors = &scalar};
+    args.recolor = (struct recolor_args){
+        .source = PT_RAMP_SCALAR, .along = {0.5f}, .zero = 2.0f, .entries = 2, .gain = 1.0f, .contrast = 1.0f};
+    const float ramp[] = {0, 0, 0, 1, 1, 1};
+    struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff, .colors = &scalar, .ramps = ramp};
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.5) < 1e-6);
     args.recolor.graded = 1;
     args.recolor.gain = 4.0f;
@@ -379,27 +395,28 @@ static void sanity(struct harness *h)
     struct shade_args args = {.view = {.width = 1, .height = 1}, .light_count = 1};
     args.instance = (struct instance_args){
         .id_count = 1, .has_normals = 1, .opacity = 1.0f, .lit = 1, .shininess = 8, .diffuse = 1.0f, .color = {1, 0.5f, 0}};
-    args.lights[0] = (struct light_args){.type = 1, .color = {(float)3.14159265358979, 0.0f, 0.0f}, .vector = {0, 0, 1}};
-    struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff};
+    struct light_view lights = {.world = {0}};
+    lights.each[0] = (struct light_args){.type = 1, .color = {(float)3.14159265358979, 0.0f, 0.0f}, .vector = {0, 0, 1}};
+    struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff, .lights = &lights};
     struct ref_shade out = ref_shade(&args, &planes, 0, 0);
     HARNESS_CHECK(h, fabs(out.color[0] - 1.0) < 1e-6 && out.color[1] == 0.0 && out.color[3] == 1.0);
-    args.lights[0].type = 2; // two units before the wall: a quarter
-    args.lights[0].vector[2] = 0.0f;
+    lights.each[0].type = 2; // two units before the wall: a quarter
+    lights.each[0].vector[2] = 0.0f;
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.25) < 1e-6);
     uint32_t word = 51; // a fifth of one sample is lost
     planes.shadows = &word;
-    args.lights[0].shadow = 1;
-    args.lights[0].shadow_scale = 1.0f / 255.0f;
+    lights.each[0].shadow = args.casting = 1;
+    args.scales[0] = 1.0f / 255.0f;
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.2) < 1e-6);
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).shadow - 0.8) < 1e-6);
-    args.lights[0].shadow = 0;
+    args.casting = 0;
     args.instance.specular = 1.0f; // the highlight doubles it
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.5) < 1e-6);
     args.light_count = 0;
     args.instance.ambient = args.directed = 1;
-    args.ambient[0] = 0.5f; // half a sphere's worth of white sky above the eye, which the wall, turned to it, sees whole
-    args.ambient[3] = 0.5f;
-    args.ambient[26] = -1.0f; // below zero: no light
+    lights.ambient[0][0] = 0.5f; // half a sphere's worth of white sky above the eye, which the wall, turned to it, sees whole
+    lights.ambient[3][0] = 0.5f;
+    lights.ambient[8][2] = -1.0f; // below zero: no light
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 1.0) < 1e-6);
     HARNESS_CHECK(h, ref_shade(&args, &planes, 0, 0).color[2] == 0.0);
     HARNESS_CHECK(h, fabs(ref_srgb(188) - 0.502886) < 1e-5 && ref_srgb(255) == 1.0 && ref_srgb(0) == 0.0);

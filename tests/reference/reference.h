@@ -188,6 +188,8 @@ struct ref_planes {
     const float *albedo;     // colours without light
     const float *slopes;     // NULL: none
     const uint32_t *shadows; // words, by light and id - id_base
+    const struct light_view *lights;
+    const float *ramps;
 };
 
 // Does the key belong to the instance?

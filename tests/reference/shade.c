@@ -64,20 +64,20 @@ static int place_on_ramp(const struct shade_args *args, const struct ref_planes 
     return 1;
 }
 
-static double ramp_value(const struct recolor_args *recolor, double t, int channel)
+// ramp: the instance's.
+static double ramp_value(const struct recolor_args *recolor, const float *ramp, double t, int channel)
 {
     double at = fmin(fmax(t, 0.0), 1.0) * (recolor->entries - 1.0);
     int low = (int)fmin(floor(at), recolor->entries - 2.0);
-    double from = recolor->ramp[3 * low + channel], to = recolor->ramp[3 * low + 3 + channel];
+    double from = ramp[3 * low + channel], to = ramp[3 * low + 3 + channel];
     return from + (at - low) * (to - from);
 }
 
-static double steepest(const struct recolor_args *recolor, int channel)
+static double steepest(const struct recolor_args *recolor, const float *ramp, int channel)
 {
     double most = 0.0;
     for (uint32_t i = 0; i + 1 < recolor->entries; i++)
-        most = fmax(most,
-                    fabs((double)recolor->ramp[3 * i + 3 + (uint32_t)channel] - recolor->ramp[3 * i + (uint32_t)channel]));
+        most = fmax(most, fabs((double)ramp[3 * i + 3 + (uint32_t)channel] - ramp[3 * i + (uint32_t)channel]));
     return most;
 }
 
@@ -94,14 +94,15 @@ static void recolor(const struct shade_args *args, const struct ref_planes *plan
                     double albedo[3], double errors[3])
 {
     const struct recolor_args *recolor = &args->recolor;
+    const float *ramp = recolor->source ? planes->ramps + 3 * (size_t)recolor->first : NULL;
     double t, off;
     int placed = recolor->source && place_on_ramp(args, planes, id, ray, z, &t, &off);
     for (int c = 0; c < 3; c++) {
         errors[c] = TOL_UNIT * fabs(albedo[c]);
         if (recolor->source)
-            albedo[c] = placed ? ramp_value(recolor, t, c) : args->instance.color[c];
+            albedo[c] = placed ? ramp_value(recolor, ramp, t, c) : args->instance.color[c];
         if (placed) // entries more or less, and what between two of them is rounded
-            errors[c] = (off + 4.0 * TOL_UNIT) * (recolor->entries - 1.0) * steepest(recolor, c) + 4.0 * TOL_UNIT;
+            errors[c] = (off + 4.0 * TOL_UNIT) * (recolor->entries - 1.0) * steepest(recolor, ramp, c) + 4.0 * TOL_UNIT;
         if (!recolor->graded)
             continue;
         double value = graded(recolor, albedo[c]), more = graded(recolor, albedo[c] + errors[c]);
@@ -241,14 +242,14 @@ static void add_light(struct lighting *s, const struct light_args *light, struct
 }
 
 // off: by the normal's error, and by roundings, a few of each term.
-static double ambient_of(const float k[9], struct ref_vec n, double normal_error, double *off)
+static double ambient_of(const pt_vec4 k[9], int c, struct ref_vec n, double normal_error, double *off)
 {
     const double basis[9] = {1.0, n.x, n.y, n.z, n.x * n.y, n.y * n.z, n.z * n.x, n.x * n.x - n.y * n.y, 3.0 * n.z * n.z - 1.0};
     const double slopes[9] = {0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 6.0}; // at most, of a unit normal
     double sum = 0.0;
     for (int i = 0; i < 9; i++) {
-        sum += k[i] * basis[i];
-        *off += fabs((double)k[i]) * (slopes[i] * (normal_error + TOL_NORMAL) + 12.0 * TOL_UNIT);
+        sum += k[i][c] * basis[i];
+        *off += fabs((double)k[i][c]) * (slopes[i] * (normal_error + TOL_NORMAL) + 12.0 * TOL_UNIT);
     }
     return fmax(sum, 0.0);
 }
@@ -292,29 +293,29 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     struct lighting s = {
         .instance = instance, .n = n, .viewer = viewer, .position = position, .position_error = position_error};
     for (int c = 0; c < 3; c++) {
-        double off = 0.0,
-               ambient = args->directed ? ambient_of(args->ambient + 9 * c, n, out.normal_error, &off) : args->world[c];
+        double off = 0.0, ambient = args->directed ? ambient_of(planes->lights->ambient, c, n, out.normal_error, &off)
+                                                   : planes->lights->world[c];
         s.light[c] = instance->ambient * ambient;
         s.loose[c] = TOL_COLOR * fabs(s.light[c]) + instance->ambient * off;
     }
     uint32_t casting = 0;
     double arrived = 0.0;
     for (uint32_t i = 0; i < args->light_count; i++) {
-        const struct light_args *light = &args->lights[i];
+        const struct light_args *light = &planes->lights->each[i];
         double share = 1.0;
-        if (light->shadow) {
+        if (args->casting && light->shadow) {
             size_t word = args->of_pixels
                               ? (light->shadow - 1) * (size_t)view->width * view->height +
                                     (planes->from[pixel] & ~PT_FROM_MIXED)
                               : (light->shadow - 1) * (size_t)instance->id_count + (ref_key_id(key) - instance->id_base);
-            share -= (planes->shadows[word] & PT_SHADOW_SUM) * (double)light->shadow_scale;
+            share -= (planes->shadows[word] & PT_SHADOW_SUM) * (double)args->scales[light->shadow - 1];
             arrived += share;
             casting++;
         }
         if (light->type != AREA_LIGHT)
             add_light(&s, light, ref_vec_of(light->vector), share, &out);
         for (int j = 0; light->type == AREA_LIGHT && j < PT_AREA_POINTS; j++)
-            add_light(&s, light, ref_vec_of(light->points + 3 * j), share, &out);
+            add_light(&s, light, ref_vec_of(light->points[j]), share, &out);
     }
     out.shadow = casting ? arrived / casting : 1.0;
     for (int c = 0; c < 3; c++) {

@@ -779,9 +779,63 @@ static void test_every_kind_has_its_passes(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// What passes share is written once: light where some cloud is lit, of ramps those that differ. What an instance has of its own is in
+// its arguments, and these are small; what is known late too.
+static void test_light_and_ramps_are_shared(void **state)
+{
+    (void)state;
+    static const float red[] = {0, 0, 0, 1, 0, 0}, green[] = {0, 0, 0, 0, 1, 0, 1, 1, 1};
+    const patina_light_desc lights[] = {
+        {.struct_size = sizeof *lights, .type = PATINA_LIGHT_POINT, .power = 3, .position = {0, 0, 4}},
+        {.struct_size = sizeof *lights, .type = PATINA_LIGHT_SUN, .power = 3, .direction = {0, 0, -1}, .shadows = 1}};
+    patina_cloud_style style = {.struct_size = sizeof style, .color_source = PATINA_COLOR_HEIGHT};
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(NULL, 2.5, 1, 0);
+    for (int i = 0; i < 4; i++) { // the third is lit and receives shadows, the fourth is lit alone
+        style.ramp = i == 1 ? green : red;
+        style.ramp_count = i == 1 ? 3 : 2;
+        style.lighting = i < 2 ? PATINA_LIGHTING_UNLIT : PATINA_LIGHTING_LIT;
+        style.shadow_off = i < 3 ? 0 : PATINA_SHADOW_NO_RECEIVE;
+        assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
+        struct pt_plan plan = plan_of(scene);
+        assert_true((plan.light != NULL) == (i >= 2));
+        assert_int_equal(plan.ramp_entries, i == 0 ? 2 : 5);
+        pt_plan_destroy(&plan);
+    }
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(patina_scene_add_light(scene, &lights[i]), PATINA_OK);
+    struct pt_plan plan = plan_of(scene);
+    assert_true(plan.light->each[0].type == PATINA_LIGHT_POINT && !plan.light->each[0].shadow);
+    assert_true(plan.light->each[1].type == PATINA_LIGHT_SUN && plan.light->each[1].shadow == 1);
+    uint32_t shades = 0;
+    for (uint32_t i = 0; i < plan.pass_count; i++) {
+        const struct pt_pass *pass = &plan.passes[i];
+        struct shade_args args;
+        if (pass->kernel != PT_KERNEL_shade)
+            continue;
+        assert_true(pass->argument_size == sizeof args && sizeof args < 1024);
+        memcpy(&args, pass->arguments, sizeof args);
+        const uint32_t instance = plan.instances[shades++].of, lit = instance > 1;
+        assert_true(pass->refs[PT_BUF_shade_lights].of == (lit ? PT_OF_PLAN : PT_OF_NOTHING));
+        assert_true(pass->refs[PT_BUF_shade_ramps].of == PT_OF_PLAN);
+        assert_int_equal(args.light_count, 2 * lit);
+        assert_int_equal(args.light_types, lit ? 1u << PATINA_LIGHT_POINT | 1u << PATINA_LIGHT_SUN : 0);
+        assert_int_equal(args.casting, instance == 2);
+        assert_int_equal(args.recolor.first, instance == 1 ? 2 : 0);
+        assert_true((pass->late == PT_LATE_POINTS) == (instance == 2));
+        pt_plan_late(pass, (const uint32_t[PT_MAX_LIGHTS]){5}, &args);
+        assert_true(args.scales[0] == (instance == 2 ? 1.0f / (255.0f * 5.0f) : 0.0f));
+    }
+    assert_int_equal(shades, 4);
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_light_and_ramps_are_shared),
         cmocka_unit_test(test_every_kind_has_its_passes),
         cmocka_unit_test(test_lines_are_planned_where_asked_for),
         cmocka_unit_test(test_every_pass_runs_or_has_a_reason),

@@ -16,12 +16,8 @@ static void ask_for_colors(const struct tail *tail, const struct pt_seen_row *se
         const struct shade_args *args = tail->passes[i].call.arguments;
         const char *colors = PT_DATA(&tail->passes[i].call, shade, colors);
         const size_t bytes = pt_color_bytes[args->instance.color_format], size = lies_far(&args->instance, bytes) ? bytes : 0;
-        const uint32_t *words[PT_MAX_LIGHTS];
-        uint32_t casting = 0;
-        for (uint32_t l = 0; l < args->light_count; l++)
-            if (args->lights[l].shadow && !args->of_pixels) // those lie as the pixels do
-                words[casting++] = (const uint32_t *)PT_DATA(&tail->passes[i].call, shade, shadows) +
-                                   (size_t)(args->lights[l].shadow - 1) * args->instance.id_count;
+        const uint32_t *words = PT_DATA(&tail->passes[i].call, shade, shadows);
+        const uint32_t casting = args->of_pixels ? 0 : args->casting; // those lie as the pixels do
         for (uint32_t x = seen->first; (size || casting) && x < seen->end; x += PT_LANES) {
             size_t at = (size_t)y * view->width + x;
             vi id;
@@ -34,7 +30,7 @@ static void ask_for_colors(const struct tail *tail, const struct pt_seen_row *se
                 __builtin_prefetch(colors + size * points[k], 0, 1); // into the second level
             for (uint32_t l = 0; l < casting; l++)
                 for (uint32_t k = 0; k < PT_LANES; k++)
-                    __builtin_prefetch(words[l] + points[k], 0, 1);
+                    __builtin_prefetch(words + (size_t)l * args->instance.id_count + points[k], 0, 1);
         }
     }
 }
@@ -80,6 +76,7 @@ static inline __attribute__((always_inline)) void light_row(const struct tail *t
                                                             const struct pt_cpu_call *call, int32_t y, int plain)
 {
     const struct shade_args *args = call->arguments;
+    const struct light_view *lights = PT_DATA(call, shade, lights);
     const uint32_t *shadows = PT_DATA(call, shade, shadows);
     const struct view_args *view = tail->planes.view;
     const struct pt_color_row *out = &walk->shaded[slot(tail, y)];
@@ -96,8 +93,8 @@ static inline __attribute__((always_inline)) void light_row(const struct tail *t
         if (!vm_bits(ours))
             continue;
         float *const *blended = reach && reach == tail->reach && one_layer[x / PT_LANES] ? walk->blended : NULL;
-        vf share = pt_shade_pixels(args, &tail->planes, around, tail->weights, blended, shadows, x, (uint32_t)y, id, ours,
-                                   plain, color, normal);
+        vf share = pt_shade_pixels(args, &tail->planes, around, tail->weights, blended, lights, shadows, x, (uint32_t)y, id,
+                                   ours, plain, color, normal);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(out->color[k] + x, color[k], ours);
         for (uint32_t k = 0; k < 3 && tail->shows_normals; k++)
@@ -164,7 +161,7 @@ static void fetch_colors(const struct tail *tail, const struct pt_cpu_call *call
         const vi source = pt_color_pixels(&args->instance, pt_source(&tail->planes, at), at);
         pt_albedo(&args->instance, PT_DATA(call, shade, colors), id, source, ours, albedo);
         if (pt_recolors(args))
-            pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
+            pt_recolor(args, PT_DATA(call, shade, ramps), x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(out->color[k] + x, albedo[k], ours);
     }

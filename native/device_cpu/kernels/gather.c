@@ -71,7 +71,7 @@ static inline void light(const struct gather *gather, const struct points *point
     for (int k = 0; k < 2 && args->view.perspective; k++)
         ray[k] = vf_select(before, ray[k], zero);
     if (pt_recolors(args))
-        pt_recolor_at(args, ray, points->z, points->some, color);
+        pt_recolor_at(args, PT_DATA(gather->call, gather, ramps), ray, points->z, points->some, color);
     if (!args->instance.lit)
         return;
     vf_view_normal(&args->instance, word, n);
@@ -81,8 +81,9 @@ static inline void light(const struct gather *gather, const struct points *point
     const vf scale = vf_rsqrt(vf_select(known, square, one));
     for (int k = 0; k < 3; k++) // without one: across the view
         n[k] = vf_select(known, n[k] * scale, k == 2 ? one : zero);
-    const struct pt_words words = {PT_DATA(gather->call, gather, shadows), args->instance.id_count};
-    pt_phong(args, 0, &words, ray, points->id, points->some, points->z, n, color);
+    const struct pt_lights lights = {PT_DATA(gather->call, gather, lights), PT_DATA(gather->call, gather, shadows),
+                                     args->instance.id_count};
+    pt_phong(args, 0, &lights, ray, points->id, points->some, points->z, n, color);
 }
 
 // 3. W of [S Eq. 22] in the lowest byte, and opacity above it.

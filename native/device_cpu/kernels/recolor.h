@@ -29,15 +29,16 @@ static inline vf pt_place_on_ramp(const struct shade_args *args, const vf toward
     return (along - vf_set(recolor->along[2]) * depth) + zero;
 }
 
-static inline void pt_ramp(const struct recolor_args *recolor, vf t, vm lanes, vf color[3])
+static inline void pt_ramp(const struct recolor_args *recolor, const float *ramps, vf t, vm lanes, vf color[3])
 {
+    const float *ramp = ramps + 3 * (size_t)recolor->first;
     t = vf_min(vf_max(t, vf_zero()), vf_set(1.0f));
     vf at = t * vf_set((float)(recolor->entries - 1));
     vf low = vf_min(vf_floor(at), vf_set((float)(recolor->entries - 2)));
     vf share = at - low;
     vi index = vi_mul(vf_int(low), vi_set(3));
     for (uint32_t k = 0; k < 3; k++) {
-        vf from = vf_gather(recolor->ramp + k, index, lanes), to = vf_gather(recolor->ramp + 3 + k, index, lanes);
+        vf from = vf_gather(ramp + k, index, lanes), to = vf_gather(ramp + 3 + k, index, lanes);
         color[k] = from + share * (to - from);
     }
 }
@@ -55,13 +56,13 @@ static inline vf pt_grade(const struct recolor_args *recolor, vf c)
     return vf_max(vf_min(c, vf_set(PT_BRIGHTEST)), vf_set(-PT_BRIGHTEST));
 }
 
-// In and out: the points' own colours; where scalars are the ramp's source, these in the first.
-static inline void pt_recolor_at(const struct shade_args *args, const vf ray[2], vf z, vm ours, vf color[3])
+// In and out: the points' own colours; where scalars are the ramp's source, these in the first. ramps: of the picture.
+static inline void pt_recolor_at(const struct shade_args *args, const float *ramps, const vf ray[2], vf z, vm ours, vf color[3])
 {
     const struct recolor_args *recolor = &args->recolor;
     if (recolor->source) {
         vf scalars = color[0], t = pt_place_on_ramp(args, ray, z, scalars);
-        pt_ramp(recolor, t, ours, color);
+        pt_ramp(recolor, ramps, t, ours, color);
         vm number = vf_le(scalars, scalars);
         for (uint32_t k = 0; k < 3 && recolor->source == PT_RAMP_SCALAR; k++)
             color[k] = vf_select(number, color[k], vf_set(args->instance.color[k]));
@@ -71,11 +72,12 @@ static inline void pt_recolor_at(const struct shade_args *args, const vf ray[2],
 }
 
 // Of PT_LANES pixels from (x, y) on.
-static inline void pt_recolor(const struct shade_args *args, uint32_t x, uint32_t y, vf z, vm ours, vf color[3])
+static inline void pt_recolor(const struct shade_args *args, const float *ramps, uint32_t x, uint32_t y, vf z, vm ours,
+                              vf color[3])
 {
     vf ray[2];
     vf_ray(&args->view, x, y, ray);
-    pt_recolor_at(args, ray, z, ours, color);
+    pt_recolor_at(args, ramps, ray, z, ours, color);
 }
 
 static inline int pt_recolors(const struct shade_args *args) { return args->recolor.source || args->recolor.graded; }

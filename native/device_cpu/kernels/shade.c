@@ -45,9 +45,9 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         const vi source = pt_color_pixels(&args->instance, pt_source(&shade->planes, at), at);
         pt_albedo(&args->instance, PT_DATA(shade->call, shade, colors), id, source, ours, color);
         if (pt_recolors(args))
-            pt_recolor(args, x, y, vf_load(around[args->blend]->z + x), ours, color);
-        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, PT_DATA(shade->call, shade, shadows), x,
-                                   y, id, ours, 0, color, normal);
+            pt_recolor(args, PT_DATA(shade->call, shade, ramps), x, y, vf_load(around[args->blend]->z + x), ours, color);
+        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, PT_DATA(shade->call, shade, lights),
+                                   PT_DATA(shade->call, shade, shadows), x, y, id, ours, 0, color, normal);
         normal[3] = color[3] = pt_opacity(&args->instance, PT_DATA(shade->call, shade, colors),
                                           PT_DATA(shade->call, shade, opacities), id, source, ours);
         for (int k = 0; k < 3; k++)

@@ -105,18 +105,18 @@ static inline vf pt_power(vf x, uint32_t exponent)
     return result;
 }
 
-// Shadow words: a light's lie `stride` apart from the next one's.
-struct pt_words {
+// The light, and shadow words: those of a light lie `stride` apart from the next one's.
+struct pt_lights {
+    const struct light_view *view;
     const uint32_t *words;
     size_t stride;
 };
 
-// The share of a light that arrives at points, by their shadow words [D 6].
-static inline vf pt_arrives(const struct light_args *light, const struct pt_words *shadows, vi at, vm ours)
+// The share of a light, the cast-th of those that cast shadows, that arrives at points, by their words [D 6].
+static inline vf pt_arrives(const struct shade_args *args, const struct pt_lights *lights, uint32_t cast, vi at, vm ours)
 {
-    const uint32_t *words = shadows->words + (light->shadow - 1) * shadows->stride;
-    vi sum = vi_and(vi_gather(words, at, ours), vi_set(PT_SHADOW_SUM));
-    return vf_set(1.0f) - vi_convert(sum) * vf_set(light->shadow_scale);
+    vi sum = vi_and(vi_gather(lights->words + cast * lights->stride, at, ours), vi_set(PT_SHADOW_SUM));
+    return vf_set(1.0f) - vi_convert(sum) * vf_set(args->scales[cast]);
 }
 
 // Direction to the light at `from`, and its falloff there times what is in falloff; suns have none.
@@ -198,18 +198,15 @@ static inline void pt_place(const struct shade_args *args, const vf ray[2], vf z
 // Whether all light is of suns without shadows and the same from all around, and nothing shines.
 static inline int pt_plain(const struct shade_args *args)
 {
-    uint32_t others = args->instance.specular > 0.0f || args->directed;
-    for (uint32_t i = 0; i < args->light_count; i++)
-        others |= (args->lights[i].type ^ 1u) | args->lights[i].shadow;
-    return !others;
+    return !(args->instance.specular > 0.0f || args->directed || args->casting || args->light_types > 1u << 1);
 }
 
-// Ambient light by the direction of the normal.
-static inline vf pt_ambient(const float *k, const vf n[3])
+// Channel c of ambient light by the direction of the normal.
+static inline vf pt_ambient(const pt_vec4 k[9], int c, const vf n[3])
 {
-    vf low = (vf_set(k[0]) + vf_set(k[1]) * n[0]) + (vf_set(k[2]) * n[1] + vf_set(k[3]) * n[2]);
-    vf mixed = (vf_set(k[4]) * (n[0] * n[1]) + vf_set(k[5]) * (n[1] * n[2])) + vf_set(k[6]) * (n[2] * n[0]);
-    vf square = vf_set(k[7]) * (n[0] * n[0] - n[1] * n[1]) + vf_set(k[8]) * (vf_set(3.0f) * (n[2] * n[2]) - vf_set(1.0f));
+    vf low = (vf_set(k[0][c]) + vf_set(k[1][c]) * n[0]) + (vf_set(k[2][c]) * n[1] + vf_set(k[3][c]) * n[2]);
+    vf mixed = (vf_set(k[4][c]) * (n[0] * n[1]) + vf_set(k[5][c]) * (n[1] * n[2])) + vf_set(k[6][c]) * (n[2] * n[0]);
+    vf square = vf_set(k[7][c]) * (n[0] * n[0] - n[1] * n[1]) + vf_set(k[8][c]) * (vf_set(3.0f) * (n[2] * n[2]) - vf_set(1.0f));
     return vf_max((low + mixed) + square, vf_zero());
 }
 
@@ -218,37 +215,37 @@ static inline vf pt_ambient(const float *k, const vf n[3])
 // none does.
 // plain: what pt_plain says, as a constant: the compiler leaves out all else, and spills nothing. Shading takes a tenth less.
 static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args *args, int plain,
-                                                         const struct pt_words *shadows, const vf ray[2], vi at, vm ours, vf z,
+                                                         const struct pt_lights *lights, const vf ray[2], vi at, vm ours, vf z,
                                                          const vf n[3], vf color[3])
 {
     const struct instance_args *instance = &args->instance;
     struct pt_surface_point point;
     vf diffuse[3], specular[3], arrived = vf_zero();
     uint32_t casting = 0;
-    if (plain && (instance->specular > 0.0f || args->directed))
+    if (plain && (instance->specular > 0.0f || args->directed || args->casting))
         __builtin_unreachable();
     pt_place(args, ray, z, n, &point);
     for (int k = 0; k < 3; k++)
         diffuse[k] = specular[k] = vf_zero();
     for (uint32_t i = 0; i < args->light_count; i++) {
-        const struct light_args *light = &args->lights[i];
+        const struct light_args *light = &lights->view->each[i];
         vf share = vf_set(1.0f);
-        if (plain && (light->type != 1 || light->shadow))
+        if (plain && light->type != 1)
             __builtin_unreachable();
-        if (light->shadow) {
-            share = pt_arrives(light, shadows, at, ours);
+        if (!plain && args->casting && light->shadow) {
+            share = pt_arrives(args, lights, light->shadow - 1, at, ours);
             arrived = arrived + share;
             casting++;
         }
         if (light->type != 4) // PATINA_LIGHT_AREA
             pt_add_light(instance, light, light->vector, share, &point, diffuse, specular);
         for (uint32_t j = 0; light->type == 4 && j < PT_AREA_POINTS; j++)
-            pt_add_light(instance, light, light->points + 3 * j, share, &point, diffuse, specular);
+            pt_add_light(instance, light, light->points[j], share, &point, diffuse, specular);
     }
     for (int k = 0; k < 3; k++) {
-        vf light = vf_set(instance->ambient * args->world[k]);
+        vf light = vf_set(instance->ambient * lights->view->world[k]);
         if (args->directed)
-            light = vf_set(instance->ambient) * pt_ambient(args->ambient + 9 * k, point.n);
+            light = vf_set(instance->ambient) * pt_ambient(lights->view->ambient, k, point.n);
         light = light + vf_set(instance->diffuse) * diffuse[k];
         if (instance->specular > 0.0f)
             light = light + vf_set(instance->specular) * specular[k];
@@ -264,9 +261,9 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
 // the casting lights that arrives.
 static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes,
                                                                 const struct pt_seen_row *const *around, const float *weights,
-                                                                float *const *blended, const uint32_t *shadows, uint32_t x,
-                                                                uint32_t y, vi id, vm ours, int plain, vf color[3],
-                                                                vf normal[3])
+                                                                float *const *blended, const struct light_view *view,
+                                                                const uint32_t *shadows, uint32_t x, uint32_t y, vi id, vm ours,
+                                                                int plain, vf color[3], vf normal[3])
 {
     size_t at = (size_t)y * args->view.width + x;
     const struct pt_seen_row *own = around[args->blend];
@@ -290,8 +287,8 @@ static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct sha
     vf ray[2];
     vf_ray(&args->view, x, y, ray);
     const size_t pixels = (size_t)args->view.width * args->view.height;
-    const struct pt_words words = {shadows, args->of_pixels ? pixels : args->instance.id_count};
-    return pt_phong(args, plain, &words, ray, args->of_pixels ? pt_source(planes, at) : id, ours, vf_load(own->z + x), normal,
+    const struct pt_lights lights = {view, shadows, args->of_pixels ? pixels : args->instance.id_count};
+    return pt_phong(args, plain, &lights, ray, args->of_pixels ? pt_source(planes, at) : id, ours, vf_load(own->z + x), normal,
                     color);
 }
 
