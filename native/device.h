@@ -47,6 +47,8 @@ struct pt_buffer {
     uint32_t wrapped; // CPU device: data belongs to somebody else
     size_t clean[2];  // keys: bytes at its beginning and at its end that are empty
     size_t wanted;    // bytes that it lacks to be large enough for a kernel that answered PT_MORE_ROOM
+    const void
+        *source; // GL device: what was lent for it, as long as that lives; of PT_IN_RANGES all there is of it, and name is 0
 };
 
 // What run answers where a buffer of bins is too small: nothing that others read was written. Whoever bound it gives it as much as is
@@ -103,11 +105,26 @@ struct pt_group {
     double ms;  // out: that it took
 };
 
+// How a buffer is made of what is given.
+enum {
+    PT_COPY = 0,
+    PT_BORROW = 1, // that lives as long as the buffer, unchanged: a device need not copy it
+    PT_IN_RANGES =
+        2, // what a cloud's points have: a device that copies does so a range at a time, whenever a kernel asks for it
+};
+
+// What a device that copies clouds may hold of them, where they are larger.
+struct pt_ranges {
+    uint64_t most;   // bytes that a kernel reads of points at a time; 0: clouds lie there whole
+    uint64_t failed; // bytes of clouds that the driver had no memory for; 0: it never came to that
+    uint64_t read;   // out: bytes of points, in ranges
+    uint32_t rounds; // out: ranges that the kernel took that took most
+};
+
 struct pt_device_ops {
     void (*destroy)(struct patina_device *device);
-    // Uninitialised memory, or a copy of source when not NULL. A CPU device may keep the pointer instead of a copy when
-    // `borrow` is set: source must then stay alive and unchanged as long as the buffer.
-    int (*buffer_create)(struct patina_device *device, size_t size, const void *source, int borrow, struct pt_buffer *out);
+    // Uninitialised memory, or a copy of source when not NULL. how: bits PT_BORROW, PT_IN_RANGES.
+    int (*buffer_create)(struct patina_device *device, size_t size, const void *source, int how, struct pt_buffer *out);
     void (*buffer_destroy)(struct patina_device *device, struct pt_buffer *buffer);
     int (*buffer_write)(struct patina_device *device, struct pt_buffer *buffer, size_t offset, const void *source, size_t size);
     int (*buffer_read)(struct patina_device *device, const struct pt_buffer *buffer, size_t offset, void *target, size_t size);
@@ -131,8 +148,7 @@ struct pt_device_ops {
                       _Atomic float *progress);
     // Waits for all work (so that a clock means something).
     int (*wait)(struct patina_device *device);
-    // Until the next call kernels call look(context) from time to time, from any of their threads; look NULL: no longer. NULL where a
-    // device has copies of what it is given to borrow.
+    // Until the next call kernels call look(context) from time to time, from any of their threads; look NULL: no longer.
     void (*watch)(struct patina_device *device, void (*look)(void *context), void *context);
 };
 
@@ -140,9 +156,12 @@ struct patina_device {
     struct pt_handle handle;
     const struct pt_device_ops *ops;
     patina_device_info info;
-    uint32_t bin_threads; // that fill bins of discs; 0: its kernels do without, and planes of such bins have no memory
-    uint64_t memory_cap;  // bytes of planes a frame may hold; 0: no limit
-    uint64_t mapped_cap;  // bytes that a picture holds of clouds in mapped files; 0: as run/pager.h chooses
+    uint32_t bin_threads;    // that fill bins of discs; 0: its kernels do without, and planes of such bins have no memory
+    uint64_t memory_cap;     // bytes of planes a frame may hold; 0: no limit
+    uint64_t mapped_cap;     // bytes that a picture holds of clouds in mapped files; 0: as run/pager.h chooses
+    int copies;              // what it is given to borrow, into memory of its own
+    uint64_t own_memory;     // bytes that this has for all, as its driver said at the start; 0: not known
+    struct pt_ranges ranges; // run/pager.h sets it for a picture
     // Frames of one device take turns, for its scratch is one. `changed` is told when a turn ends, or a frame is cancelled.
     struct pt_mutex turns;
     struct pt_condition changed;

@@ -343,6 +343,7 @@ size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, ch
     pt_frame_share_planes(frame, &plan); // without memory it stays untold
     plan.mapped_cap = pt_pager_cap(frame->device, scene, &plan.round_bytes);
     plan.round_bytes = plan.mapped_cap ? plan.round_bytes : 0;
+    plan.copied = frame->device->copies;
     size_t length = pt_plan_text(scene, &plan, buffer, size);
     pt_plan_destroy(&plan);
     leave_clouds(scene);

@@ -29,9 +29,9 @@ static uint32_t available_isas(const struct pt_cpu_isa *isas[4])
 
 // ---- buffers ---------------------------------------------------------------------------------------------------------
 
-static int cpu_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow, struct pt_buffer *out)
+static int cpu_buffer_create(struct patina_device *device, size_t size, const void *source, int how, struct pt_buffer *out)
 {
-    *out = (struct pt_buffer){.size = size, .room = size, .wrapped = source && borrow};
+    *out = (struct pt_buffer){.size = size, .room = size, .wrapped = source && how & PT_BORROW};
     if (out->wrapped) {
         out->data = (void *)source;
         return PATINA_OK;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What runners of kernels share: programs, buffers bound as kernels.def lists them, memory of the device's own, dispatches.
 #include "device_gl.h"
+#include "shared/measured.h"
 
 #include <stdio.h>
 
@@ -9,6 +10,7 @@ int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
     if (d->programs[kernel][variant])
         return PATINA_OK;
     char name[64];
+    d->told_by_pixel[kernel][variant] = 0;
     snprintf(name, sizeof name, "kernels/%s.comp", pt_kernels[kernel].name);
     return pt_gl_program(d, name, definitions, &d->programs[kernel][variant]);
 }
@@ -42,11 +44,19 @@ int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, si
     return PATINA_OK;
 }
 
-size_t pt_gl_part(const struct pt_buffer_row *row)
+int pt_gl_is_part(const struct pt_gl_work *work, const struct pt_buffer_row *row)
 {
-    if (row->formats & 1u << PT_FORMAT_position)
-        return 12;
-    return row->formats & 1u << PT_FORMAT_word && !row->binding ? 4 : 0;
+    static const uint32_t of_points = 1u << PT_FORMAT_position | 1u << PT_FORMAT_word | 1u << PT_FORMAT_color |
+                                      1u << PT_FORMAT_opacity | 1u << PT_FORMAT_radius | 1u << PT_FORMAT_scalar |
+                                      1u << PT_FORMAT_class | 1u << PT_FORMAT_shape | 1u << PT_FORMAT_field |
+                                      1u << PT_FORMAT_scan;
+    const enum pt_domain domain = pt_kernels[work->kernel].domain;
+    if (!(row->formats & of_points) || (domain != PT_DOMAIN_points && domain != PT_DOMAIN_bins))
+        return 0;
+    if (work->kernel == PT_KERNEL_shadow_test && row->formats & 1u << PT_FORMAT_opacity)
+        return 0; // the caster's
+    return work->kernel != PT_KERNEL_blend || !(row->formats & 1u << PT_FORMAT_color) ||
+           ((const struct blend_args *)work->arguments)->part == PT_BLEND_COLORS; // else marks, or shadow words
 }
 
 // In place of a block that is missing any other stands: the kernel does not touch it.
@@ -69,7 +79,7 @@ int pt_gl_bind_rows(struct pt_gl_device *d, const struct pt_gl_work *work, uint3
     const struct pt_buffer_row *rows = pt_kernels[work->kernel].buffers + first;
     int result = PATINA_OK;
     for (uint32_t i = 0; i < count && result == PATINA_OK; i++)
-        if (!pt_gl_part(&rows[i]))
+        if (!pt_gl_is_part(work, &rows[i]))
             result = bind_row(d, work, &rows[i], buffers[i]);
     return result;
 }
@@ -112,9 +122,20 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
     return PATINA_OK;
 }
 
+void pt_gl_tell_by_pixel(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant)
+{
+    uint8_t *told = &d->told_by_pixel[kernel][variant];
+    if (*told == d->by_pixel)
+        return;
+    const GLuint program = d->programs[kernel][variant];
+    d->gl.ProgramUniform1ui(program, d->gl.GetUniformLocation(program, "by_pixel"), d->by_pixel); // at no place: not asked
+    *told = (uint8_t)d->by_pixel;
+}
+
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y)
 {
     if (x && y) {
+        pt_gl_tell_by_pixel(d, kernel, variant);
         d->gl.UseProgram(d->programs[kernel][variant]);
         d->gl.DispatchCompute(x, y, 1);
         d->gl.MemoryBarrier(PT_GL_BARRIERS);

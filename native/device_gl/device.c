@@ -55,6 +55,8 @@ static int close_context(struct pt_gl_device *d, void *unused)
                 d->gl.DeleteProgram(d->programs[k][v]);
         for (int i = 0; i < PT_GL_SCRATCH_COUNT; i++)
             d->gl.DeleteBuffers(1, &d->scratch[i].name);
+        d->gl.DeleteBuffers(1, &d->halves[0].name);
+        d->gl.DeleteBuffers(1, &d->halves[1].name);
         for (int i = 0; i < 2; i++)
             d->gl.DeleteProgram(d->tile_programs[i]);
         d->gl.DeleteProgram(d->list_program);
@@ -107,6 +109,37 @@ static int is_software(const char *renderer)
         if (strstr(renderer, names[i]))
             return 1;
     return 0;
+}
+
+// For tests: megabytes that an environment variable names; 0: it names none.
+static uint64_t megabytes(const char *variable)
+{
+    const char *text = getenv(variable);
+    const double number = text ? strtod(text, NULL) : 0.0;
+    return number > 0.0 && number < 1e9 ? (uint64_t)(1e6 * number) : 0;
+}
+
+static int has_extension(const struct pt_gl_device *d, const char *name)
+{
+    GLint count = 0, i = 0;
+    d->gl.GetIntegerv(GL_NUM_EXTENSIONS, &count);
+    while (i < count && strcmp((const char *)d->gl.GetStringi(GL_EXTENSIONS, (GLuint)i), name) != 0)
+        i++;
+    return i < count;
+}
+
+// What the driver says that the card's memory has room for. The memory of software is the host's.
+static void find_memory(struct pt_gl_device *d)
+{
+    enum { NVX_AVAILABLE = 0x9049, ATI_FREE = 0x87FB }; // of NVX_gpu_memory_info, ATI_meminfo: of buffers; kilobytes
+    GLint free_of_card[4] = {0};
+    if (d->base.info.hardware && has_extension(d, "GL_NVX_gpu_memory_info"))
+        d->gl.GetIntegerv(NVX_AVAILABLE, free_of_card);
+    else if (d->base.info.hardware && has_extension(d, "GL_ATI_meminfo"))
+        d->gl.GetIntegerv(ATI_FREE, free_of_card);
+    const uint64_t said = megabytes("PATINA_GL_MEMORY"), largest = megabytes("PATINA_GL_LARGEST");
+    d->base.own_memory = said ? said : free_of_card[0] > 0 ? (uint64_t)free_of_card[0] << 10 : 0;
+    d->largest = largest ? (size_t)largest : SIZE_MAX;
 }
 
 // The values that the CPU device uses: float64, cut to float32.
@@ -163,6 +196,7 @@ static int open_context(struct pt_gl_device *d, void *unused)
     d->gl.GenBuffers(1, &d->arguments);
     d->gl.GenTextures(PT_UNIT_COUNT, d->textures);
     make_srgb_table(d);
+    find_memory(d);
     info->key64 = (uint32_t)pt_gl_key64_works(d);
     return pt_gl_check(d, "opening the device");
 }
@@ -185,6 +219,8 @@ static int create_buffer(struct pt_gl_device *d, void *context)
     const GladGLContext *gl = &d->gl;
     size_t padded = (b->size + 15) & ~(size_t)15; // shaders read whole words and vectors
     GLuint name = 0;
+    if (padded > d->largest)
+        return pt_gl_fail(d, PATINA_ERROR_MEMORY, "OpenGL has no memory for a buffer of %zu bytes", b->size);
     gl->GenBuffers(1, &name);
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
     gl->BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)(padded ? padded : 16), NULL, GL_DYNAMIC_COPY);
@@ -350,17 +386,35 @@ static int wait_for_work(struct pt_gl_device *d, void *unused)
     return pt_gl_check(d, "waiting for the device");
 }
 
-static int op_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow, struct pt_buffer *out)
+// It stays where it is, or as a copy in the host's memory.
+static int keep_in_ranges(struct patina_device *device, size_t size, const void *source, int how, struct pt_buffer *out)
 {
-    (void)borrow; // the device has its own memory
+    *out = (struct pt_buffer){.size = size, .room = size, .source = source};
+    if (how & PT_BORROW)
+        return PATINA_OK;
+    out->source = out->data = malloc(size);
+    if (!out->data)
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "%s: out of memory for %zu bytes of points", device->info.name,
+                       size);
+    memcpy(out->data, source, size);
+    return PATINA_OK;
+}
+
+static int op_buffer_create(struct patina_device *device, size_t size, const void *source, int how, struct pt_buffer *out)
+{
     memset(out, 0, sizeof *out);
-    return call(device, create_buffer, &(struct buffer_call){.buffer = out, .size = size, .source = source});
+    if (how & PT_IN_RANGES && size && source)
+        return keep_in_ranges(device, size, source, how, out);
+    const int result = call(device, create_buffer, &(struct buffer_call){.buffer = out, .size = size, .source = source});
+    out->source = result == PATINA_OK && how & PT_BORROW ? source : NULL;
+    return result;
 }
 
 static void op_buffer_destroy(struct patina_device *device, struct pt_buffer *buffer)
 {
     if (buffer->name)
         marshal(device, destroy_buffer, &(struct buffer_call){.buffer = buffer}, 1);
+    free(buffer->data);
     memset(buffer, 0, sizeof *buffer);
 }
 
@@ -420,6 +474,13 @@ static int op_run_tail(struct patina_device *device, const struct pt_bound_pass 
     return call(device, run_tail, &(struct tail_call){.passes = passes, .count = count});
 }
 
+static void op_watch(struct patina_device *device, void (*look)(void *context), void *context)
+{
+    struct pt_gl_device *d = (struct pt_gl_device *)device;
+    d->look = look;
+    d->watched = context;
+}
+
 static int op_wait(struct patina_device *device) { return call(device, wait_for_work, NULL); }
 
 static void op_destroy(struct patina_device *device)
@@ -431,6 +492,7 @@ static void op_destroy(struct patina_device *device)
     pt_mutex_destroy(&d->lock);
     pt_handle_destroy(&device->handle);
     free(d->queries);
+    free(d->host);
     free(d);
 }
 
@@ -446,6 +508,7 @@ static const struct pt_device_ops ops = {
     .run_tail = op_run_tail,
     .run_groups = op_run_groups,
     .wait = op_wait,
+    .watch = op_watch,
 };
 
 int pt_device_gl_create(const patina_device_desc *desc, const char *context, struct patina_device **out)
@@ -470,6 +533,7 @@ int pt_device_gl_create(const patina_device_desc *desc, const char *context, str
     d->context_ops = kind;
     d->base.info.struct_size = sizeof d->base.info;
     d->base.info.threads = 1;
+    d->base.copies = 1;
     snprintf(d->base.info.name, sizeof d->base.info.name, "%s", kind->name);
     if (pt_thread_start(&d->thread, thread_main, d, STACK_SIZE)) {
         pt_condition_destroy(&d->changed);

@@ -7,6 +7,7 @@
 #include "context.h"
 #include "device.h"
 #include "glad/gl.h"
+#include "slots.h"
 
 enum {
     PT_GL_VARIANTS = 128, // programs of one kernel: its passes and special cases
@@ -37,6 +38,8 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_SOFT_COUNTS, // soft: of each tile's list
     PT_GL_SCRATCH_SOFT_BEGINS,
     PT_GL_SCRATCH_SOFT_STATES, // soft: what pixels have come to
+    PT_GL_SCRATCH_WINNERS,     // ranges.c: what points have, by the pixels that show them; of two buffers
+    PT_GL_SCRATCH_WINNERS_TOO,
     PT_GL_SCRATCH_COUNT
 };
 
@@ -72,6 +75,7 @@ struct pt_gl_device {
     int lost;
     char message[512];
     size_t block_size; // greatest storage block
+    size_t largest;    // buffer that there is memory for, as tests have it
     size_t alignment;  // of a block's or a texture's offset in its buffer
     size_t texels;     // in a buffer texture
     GLuint arguments;
@@ -85,6 +89,17 @@ struct pt_gl_device {
     GLuint textures[PT_UNIT_COUNT];
     GLuint *queries; // timers, query_count of them
     uint32_t query_count;
+    // Of clouds that do not lie here whole: ranges.c
+    struct pt_gl_scratch halves[2];
+    uint32_t turn;   // the one at hand
+    size_t used;     // bytes of it
+    uint32_t rounds; // ranges that the kernel at hand took
+    uint32_t *host;  // keys, read back
+    size_t host_size;
+    uint32_t by_pixel; // 1: what the kernel at hand reads of points lies by pixel
+    uint8_t told_by_pixel[PT_KERNEL_COUNT][PT_GL_VARIANTS];
+    void (*look)(void *context);
+    void *watched;
     struct pt_gl_tiles tiles;
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
 };
@@ -125,10 +140,12 @@ int pt_gl_bind_buffers(struct pt_gl_device *d, const struct pt_gl_work *work);
 // Of the list's rows from `first` on those `count` that are no parts. buffers: from that of the first on.
 int pt_gl_bind_rows(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t first, uint32_t count,
                     struct pt_buffer *const *buffers);
-// Bytes a slot of what is bound in parts, since clouds are larger than blocks and textures; 0: it is bound whole.
-size_t pt_gl_part(const struct pt_buffer_row *row);
+// Whether it is bound in parts, since clouds are larger than blocks and textures: what points have, of a kernel that walks them.
+int pt_gl_is_part(const struct pt_gl_work *work, const struct pt_buffer_row *row);
 int pt_gl_bind_texture(struct pt_gl_device *d, enum pt_unit unit, const struct pt_buffer *plane);
 int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, size_t offset, size_t size); // a part of a buffer
+// Before a program runs: whether it finds what points have by pixel (ranges.c).
+void pt_gl_tell_by_pixel(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant);
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y);
 // Workgroups for every pixel, of programs whose invocations take several of a row each (lib/planes.glsl).
 int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height);
@@ -138,6 +155,22 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
 // words: 16 bytes; a pattern of 4 or 8 `bytes` repeats in them. Offset and size are multiples of 8, or size reaches the end.
 int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
                 uint32_t bytes);
+
+// ranges.c: clouds that are larger than what the device may hold of them
+enum { PT_GL_BUFFERS = 24, PT_GL_WINNERS = 2 };
+struct pt_gl_winners {
+    struct pt_buffer *buffers[PT_GL_BUFFERS], gathered[PT_GL_WINNERS];
+};
+int pt_gl_in_ranges(const struct pt_buffer *buffer); // what points have, and it is not here
+// A range: room for all of it, as pt_gl_range_room says of each buffer; then these, `each` bytes a slot, and where they lie.
+int pt_gl_range_begin(struct pt_gl_device *d, size_t size);
+size_t pt_gl_range_room(const struct pt_gl_device *d, size_t size);
+int pt_gl_range_add(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t each, const struct pt_slots *slots,
+                    const struct chunk_view *chunks, int culled, GLuint *name, size_t *offset);
+// Makes the points' buffers of a kernel that asks for single points planes of what its pixels show; winners lasts as long as work.
+int pt_gl_take_winners(struct pt_gl_device *d, struct pt_gl_work *work, struct pt_gl_winners *winners);
+int pt_gl_gather_winners(struct pt_gl_device *d, const struct pt_gl_work *work, const struct pt_buffer *buffer, uint32_t place,
+                         struct pt_buffer *out);
 
 // tiles.c
 // Lists the tiles of a key plane, unless the lists at hand are still good.

@@ -146,8 +146,10 @@ static const struct pt_buffer *keys_of(const struct pt_gl_work *work)
     return work->buffers[i];
 }
 
-int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work)
+int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *given)
 {
+    struct pt_gl_work copy = *given, *work = &copy;
+    struct pt_gl_winners winners;
     const struct view_args *view = work->arguments; // every argument struct but that of sift begins with its view
     const enum pt_domain domain = pt_kernels[work->kernel].domain;
     int result = PATINA_OK;
@@ -162,11 +164,15 @@ int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work)
         const struct view_args tiles = work->kernel == PT_KERNEL_push ? pt_gl_coarse_view(work->arguments) : *view;
         result = pt_gl_tiles(d, keys_of(work), &tiles);
     }
+    d->rounds = 0;
+    if (result == PATINA_OK)
+        result = pt_gl_take_winners(d, work, &winners);
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, work);
-    if (result != PATINA_OK)
-        return result;
-    return runners[work->kernel] ? runners[work->kernel](d, work) : run_once(d, work);
+    if (result == PATINA_OK)
+        result = runners[work->kernel] ? runners[work->kernel](d, work) : run_once(d, work);
+    d->base.ranges.rounds = d->rounds > d->base.ranges.rounds ? d->rounds : d->base.ranges.rounds;
+    return result;
 }
 
 int pt_gl_run_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count)

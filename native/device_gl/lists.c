@@ -38,6 +38,7 @@ int pt_gl_list_groups(struct pt_gl_device *d, uint32_t binding, uint32_t count, 
 int pt_gl_list_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head)
 {
     char doing[64];
+    pt_gl_tell_by_pixel(d, kernel, variant);
     d->gl.UseProgram(d->programs[kernel][variant]);
     d->gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, name);
     d->gl.DispatchComputeIndirect((GLintptr)head);

@@ -361,6 +361,7 @@ struct pt_plan {
         assessed; // of PATINA_PASS_CERTAINTY, _THICKNESS, _DENSITY, _DISAGREEMENT, bits 1 << those that are asked for and known of something
     uint64_t mapped_cap,
         round_bytes; // of what is held of clouds in files, and read of them at a time (rounds.h); 0: all there is
+    int copied;      // by a device that copies clouds: then of them all, in ranges (slots.h)
     struct pt_arena *arena;
 };
 

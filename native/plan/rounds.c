@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "rounds.h"
 
+#include "slots.h"
+
 int pt_pass_divides(const struct pt_pass *pass)
 {
     switch (pass->kernel) {
@@ -28,6 +30,25 @@ static uint32_t array_bit(enum pt_instance_buffer which, const struct patina_clo
     }
 }
 
+// Bytes a slot of what a device copies that copies clouds.
+static uint32_t copied_of(uint32_t which, const struct patina_cloud *cloud)
+{
+    switch (which) {
+    case PT_POSITIONS: return 12;
+    case PT_SURFELS:
+    case PT_FIELD:
+    case PT_FIELD_ONE: return 4;
+    case PT_SCANS: return 2;
+    case PT_COLORS: return cloud->color_format ? (uint32_t)pt_color_size(cloud->color_format) : 0;
+    case PT_OPACITIES: return cloud->opacities ? 1 : 0;
+    case PT_RADII: return cloud->radii || cloud->shapes ? 4 : 0;
+    case PT_SCALARS: return cloud->scalars ? 4 : 0;
+    case PT_CLASSES: return cloud->classes ? 1 : 0;
+    case PT_SHAPES: return cloud->shapes ? 4 : 0;
+    default: return 0; // what lies there whole
+    }
+}
+
 uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, struct pt_chunk_list *lists)
 {
     uint32_t count = 0;
@@ -48,8 +69,10 @@ uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, s
                                        .ref = k,
                                        .culled = pass->kernel == PT_KERNEL_scatter ? 1u << PT_ARRAY_SURFELS : 0};
         for (uint32_t i = 0; i < pass->ref_count; i++)
-            if (pass->refs[i].of == ref->of && pass->refs[i].index == ref->index)
+            if (pass->refs[i].of == ref->of && pass->refs[i].index == ref->index) {
                 list->arrays |= array_bit((enum pt_instance_buffer)pass->refs[i].which, cloud);
+                list->copied += copied_of(pass->refs[i].which, cloud);
+            }
     }
     return count;
 }
@@ -89,4 +112,18 @@ uint32_t pt_count_ranges(const struct pt_chunk_list *lists, uint32_t count, uint
     for (*bytes = 0; pt_next_range(lists, count, most, &range); ranges++)
         *bytes += range.bytes;
     return *bytes ? ranges : 0;
+}
+
+uint32_t pt_count_copies(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, uint64_t *bytes)
+{
+    uint32_t ranges = 0;
+    *bytes = 0;
+    for (const struct pt_chunk_list *list = lists; list < lists + count; list++) {
+        const uint64_t facing = list->copied - (list->culled ? 4 : 0); // without surfels
+        for (uint32_t c = 0; c < list->count; c++)
+            *bytes += list->chunks[c].padded * (list->chunks[c].cull ? list->copied : facing);
+        for (struct pt_slots at = {0}; at.first_chunk < list->count; at.first_chunk += at.chunk_count, ranges++)
+            at = pt_next_slots(list->chunks, list->count, at.first_chunk, most / list->copied, PT_SLOTS_A_WORD);
+    }
+    return ranges;
 }

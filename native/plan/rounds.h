@@ -12,6 +12,7 @@ struct pt_chunk_list {
     uint32_t count;
     uint32_t arrays; // bits 1 << pt_array
     uint32_t ref;    // of the pass: the chunks'
+    uint32_t copied; // bytes a slot that a device takes which copies clouds
     uint32_t culled; // of the arrays those that only chunks with a cone to be tested are read of
 };
 
@@ -29,5 +30,7 @@ uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, s
 int pt_next_range(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, struct pt_chunk_range *range);
 // In how many of them a pass runs; *bytes: of all. 0 where it reads no file.
 uint32_t pt_count_ranges(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, uint64_t *bytes);
+// The same on a device that copies clouds (slots.h): each list by itself, whatever kernel it is.
+uint32_t pt_count_copies(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, uint64_t *bytes);
 
 #endif

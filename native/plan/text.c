@@ -61,10 +61,12 @@ __attribute__((format(printf, 3, 4))) static void put_line(struct text *text, ui
 // ", in 3 rounds of 2.1 MB": of a pass that reads more of mapped files than a round may.
 static const char *rounds_of(const struct pt_plan *plan, const struct pt_pass *pass, char *buffer, size_t size)
 {
-    struct pt_chunk_list *lists = plan->round_bytes && pt_pass_divides(pass) ? calloc(pass->ref_count + 1u, sizeof *lists)
-                                                                             : NULL;
+    const int divided = plan->round_bytes && (plan->copied || pt_pass_divides(pass));
+    struct pt_chunk_list *lists = divided ? calloc(pass->ref_count + 1u, sizeof *lists) : NULL;
+    const uint32_t count = lists ? pt_pass_lists(plan, pass, lists) : 0;
     uint64_t bytes = 0;
-    uint32_t rounds = lists ? pt_count_ranges(lists, pt_pass_lists(plan, pass, lists), plan->round_bytes, &bytes) : 0;
+    uint32_t rounds = plan->copied ? pt_count_copies(lists, count, plan->round_bytes, &bytes)
+                                   : pt_count_ranges(lists, count, plan->round_bytes, &bytes);
     free(lists);
     snprintf(buffer, size, ", in %u rounds for %.1f MB", rounds, 1e-6 * (double)bytes);
     return rounds > 1 ? buffer : "";
@@ -109,6 +111,7 @@ static void put_map(struct text *text, const struct patina_scene *scene, const s
             return; // without memory it stays untold
         if ((some = map.step_count > 0)) {
             map.round_bytes = plan->round_bytes;
+            map.copied = plan->copied;
             put_line(text, depth + 1, "planes %u x %u, %u coarse levels, %llu points, %llu triangles", map.view.width,
                      map.view.height, map.levels, (unsigned long long)map.points_scattered, (unsigned long long)map.triangles);
             put_steps(text, scene, &map, map.steps, map.steps + map.step_count, depth + 1);
@@ -185,8 +188,9 @@ size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char
         put_line(&text, 0, "chunks clipped %llu, cut %llu", (unsigned long long)plan->chunks_clipped,
                  (unsigned long long)plan->chunks_cut);
     if (plan->mapped_cap)
-        put_line(&text, 0, "rounds of at most %.1f MB: clouds in files are larger than the %.1f MB that may be held of them",
-                 1e-6 * (double)plan->round_bytes, 1e-6 * (double)plan->mapped_cap);
+        put_line(&text, 0, "rounds of at most %.1f MB: %s are larger than the %.1f MB that may be held of them",
+                 1e-6 * (double)plan->round_bytes, plan->copied ? "clouds" : "clouds in files",
+                 1e-6 * (double)plan->mapped_cap);
     if (plan->peak)
         put_memory(&text, plan);
     put_steps(&text, scene, plan, plan->steps, plan->steps + plan->step_count, 0);

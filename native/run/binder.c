@@ -57,15 +57,15 @@ static int take_mask(struct pt_binder *binder, struct pt_bound_instance *bound, 
 static int take_grade(struct pt_binder *binder, struct pt_bound_instance *bound, const struct patina_grade *grade)
 {
     return bound->grade ? PATINA_OK
-                        : pt_residency_take_bytes(binder->residency, binder->device, grade->alive, grade->colors, grade->size,
-                                                  &bound->grade);
+                        : pt_residency_take_points(binder->residency, binder->device, grade->alive, grade->colors, grade->size,
+                                                   &bound->grade);
 }
 
 static int take_scans(struct pt_binder *binder, struct pt_bound_instance *bound, const struct patina_scans *scans)
 {
     return bound->scans ? PATINA_OK
-                        : pt_residency_take_bytes(binder->residency, binder->device, scans->alive, scans->scan,
-                                                  (scans->slots + 2) * sizeof *scans->scan, &bound->scans);
+                        : pt_residency_take_points(binder->residency, binder->device, scans->alive, scans->scan,
+                                                   (scans->slots + 2) * sizeof *scans->scan, &bound->scans);
 }
 
 // Where all points are soft, the words are the cloud's.

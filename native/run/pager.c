@@ -2,12 +2,15 @@
 #include "pager.h"
 
 #include "base/platform.h"
+#include "residency.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 enum {
-    SHARE = 3,        // of the free memory
+    SHARE = 3,     // of the free memory
+    OWN_SHARE = 3, // of OWN_OF parts of a device's own memory: planes need the rest
+    OWN_OF = 4,
     LEAST = 64 << 20, // bytes, however little is free: less would be read over and over
     ROUNDS_A_CAP = 2, // the last round's pages and this one's
     FULL_EIGHTHS = 7, // from here on all is given back: threads read on meanwhile
@@ -41,11 +44,67 @@ static uint64_t share_of_free(void)
     return !free_bytes ? UINT64_MAX : share < LEAST ? LEAST : share; // where nobody knows, all may be held
 }
 
+// ---- a device that copies clouds -----------------------------------------------------------------------------------------
+
+// What a scene's clouds take there, and what the largest of their chunks takes.
+static uint64_t copied_bytes(const struct patina_scene *scene, uint64_t *chunk)
+{
+    uint64_t bytes = 0;
+    *chunk = 0;
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
+        const struct patina_cloud *cloud = scene->instances[i].cloud;
+        const uint64_t all = is_first(scene, i) ? pt_cloud_copied_bytes(cloud) : 0;
+        const uint64_t most = all ? all / cloud->slots * pt_cloud_largest_chunk(cloud) : 0;
+        bytes += all;
+        *chunk = most > *chunk ? most : *chunk;
+    }
+    return bytes;
+}
+
+static uint64_t lesser(uint64_t a, uint64_t b) { return a < b ? a : b; }
+
+// The cap that was given counts what is mapped, the device's memory all there is. 0: they lie there whole.
+static uint64_t cap_of_copies(const struct patina_device *device, const struct patina_scene *scene, uint64_t mapped,
+                              uint64_t *round)
+{
+    const uint64_t own = device->own_memory / OWN_OF * OWN_SHARE, failed = device->ranges.failed;
+    uint64_t chunk, cap = device->mapped_cap && mapped > device->mapped_cap ? device->mapped_cap : UINT64_MAX;
+    const uint64_t bytes = copied_bytes(scene, &chunk);
+    if (own && bytes > own)
+        cap = lesser(cap, own);
+    if (failed && bytes >= failed)
+        cap = lesser(cap, ROUNDS_A_CAP * PT_RANGE_LEAST);
+    cap = cap == UINT64_MAX ? 0 : cap;
+    *round = cap / ROUNDS_A_CAP;
+    return cap;
+}
+
+// Ranges are of a chunk at least, and there are two of them.
+static int open_copies(struct pt_pager *pager, struct patina_device *device)
+{
+    uint64_t chunk;
+    copied_bytes(pager->scene, &chunk);
+    device->ranges = (struct pt_ranges){.most = pager->round, .failed = device->ranges.failed};
+    if (pager->cap && pager->round < chunk) {
+        device->ranges.most = 0;
+        return pt_fail(
+            &device->handle, PATINA_ERROR_MEMORY,
+            "%s: a cap of %.3f MB is too small for two ranges of points: a range is a chunk at least, of which one takes "
+            "%.3f MB here",
+            device->info.name, 1e-6 * (double)pager->cap, 1e-6 * (double)chunk);
+    }
+    return PATINA_OK;
+}
+
+// ---- the cap -------------------------------------------------------------------------------------------------------------
+
 // 0: all of it fits.
-static uint64_t cap_for(const struct patina_device *device, uint64_t mapped, uint64_t *round)
+static uint64_t cap_for(const struct patina_device *device, const struct patina_scene *scene, uint64_t mapped, uint64_t *round)
 {
     *round = 0;
-    if (!mapped || !device->ops->watch)
+    if (device->copies)
+        return cap_of_copies(device, scene, mapped, round);
+    if (!mapped)
         return 0;
     const uint64_t cap = device->mapped_cap ? device->mapped_cap : share_of_free();
     *round = cap / ROUNDS_A_CAP;
@@ -54,7 +113,7 @@ static uint64_t cap_for(const struct patina_device *device, uint64_t mapped, uin
 
 uint64_t pt_pager_cap(const struct patina_device *device, const struct patina_scene *scene, uint64_t *round)
 {
-    return cap_for(device, mapped_bytes(scene), round);
+    return cap_for(device, scene, mapped_bytes(scene), round);
 }
 
 // ---- giving back ---------------------------------------------------------------------------------------------------------
@@ -102,13 +161,11 @@ int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const st
     pager->device = device;
     pager->scene = scene;
     pager->mapped = mapped_bytes(scene);
-    pager->cap = cap_for(device, pager->mapped, &pager->round);
-    if (!device->ops->watch && device->mapped_cap && pager->mapped > device->mapped_cap)
-        return pt_fail(&device->handle, PATINA_ERROR_MEMORY,
-                       "%s copies clouds whole: theirs are %.1f MB, the cap of what is held of mapped clouds is %.1f MB; the "
-                       "processor draws them in rounds",
-                       device->info.name, 1e-6 * (double)pager->mapped, 1e-6 * (double)device->mapped_cap);
-    if (!pager->cap)
+    pager->cap = cap_for(device, scene, pager->mapped, &pager->round);
+    const int error = device->copies ? open_copies(pager, device) : PATINA_OK;
+    if (error)
+        return error;
+    if (!pager->cap || !pager->mapped)
         return PATINA_OK;
     give_back(pager);
     pager->before = pt_file_memory();
@@ -121,7 +178,12 @@ int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const st
 
 void pt_pager_close(struct pt_pager *pager)
 {
-    if (!pager->cap)
+    if (pager->device->copies) {
+        pager->read += pager->device->ranges.read;
+        pager->rounds = pager->device->ranges.rounds > pager->rounds ? pager->device->ranges.rounds : pager->rounds;
+        pager->rounds += pager->mapped && !pager->rounds; // whole: in one
+    }
+    if (!pager->cap || !pager->mapped)
         return;
     make_room(pager, 0);
     pager->device->ops->watch(pager->device, NULL, NULL);
@@ -199,7 +261,7 @@ static int run_ranges(struct pt_pager *pager, const struct bound *bound, struct 
 int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
                  struct pt_buffer *const *buffers, pt_run_bound *run, void *context)
 {
-    if (!pager || !pager->mapped)
+    if (!pager || !pager->mapped || pager->device->copies) // which looks after its ranges itself
         return run(context, buffers);
     struct bound bound = {.lists = calloc(pass->ref_count + 1u, sizeof *bound.lists)};
     uint64_t bytes = 0;

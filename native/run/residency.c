@@ -7,15 +7,34 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void destroy(struct pt_resident *resident, struct patina_device *device)
+static void drop(struct patina_device *device, struct pt_resident *resident)
 {
     for (int i = 0; i < PT_INSTANCE_BUFFERS; i++)
         device->ops->buffer_destroy(device, &resident->buffers[i]);
-    device->ops->buffer_destroy(device, &resident->marked);
     device->ops->buffer_destroy(device, &resident->fields[0]);
     device->ops->buffer_destroy(device, &resident->fields[1]);
+    device->ops->buffer_destroy(device, &resident->marked);
+}
+
+static void destroy(struct pt_resident *resident, struct patina_device *device)
+{
+    drop(device, resident);
     pt_alive_release(resident->alive);
     free(resident);
+}
+
+// How what points have is given to a device: whole, or range by range.
+static int how_points(const struct patina_device *device) { return PT_BORROW | (device->ranges.most ? PT_IN_RANGES : 0); }
+
+// Whether that is how it was given.
+static int as_now(const struct patina_device *device, const struct pt_buffer *buffer)
+{
+    return !device->copies || !buffer->size || (buffer->name == 0) == (device->ranges.most != 0);
+}
+
+static int give_points(struct patina_device *device, size_t size, const void *data, struct pt_buffer *out)
+{
+    return device->ops->buffer_create(device, size, data, how_points(device), out);
 }
 
 static void forget_dead(struct pt_residency *residency, struct patina_device *device)
@@ -40,12 +59,12 @@ static int upload_shapes(struct patina_device *device, const struct patina_cloud
     device->ops->buffer_destroy(device, &resident->buffers[PT_SHAPES]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_SIGHTS]);
     resident->shapes = atomic_load(&cloud->alive->shapes);
-    int error = device->ops->buffer_create(device, cloud->slots * 4, cloud->surfels, 1, &resident->buffers[PT_SURFELS]);
+    int error = give_points(device, cloud->slots * 4, cloud->surfels, &resident->buffers[PT_SURFELS]);
     if (!error && cloud->radii && cloud->shapes)
-        error = device->ops->buffer_create(device, cloud->slots * 4, cloud->shapes, 1, &resident->buffers[PT_SHAPES]);
+        error = give_points(device, cloud->slots * 4, cloud->shapes, &resident->buffers[PT_SHAPES]);
     if (error || !radii)
         return error;
-    return device->ops->buffer_create(device, cloud->slots * 4, radii, 1, &resident->buffers[PT_RADII]);
+    return give_points(device, cloud->slots * 4, radii, &resident->buffers[PT_RADII]);
 }
 
 // The colours and scalars as they are now, in place of what the buffer holds.
@@ -55,18 +74,17 @@ static int upload_colors(struct patina_device *device, const struct patina_cloud
     device->ops->buffer_destroy(device, &resident->buffers[PT_SCALARS]);
     resident->colors = atomic_load(&cloud->alive->colors);
     int error = !cloud->scalars ? PATINA_OK
-                                : device->ops->buffer_create(device, pt_scalar_bytes(cloud), cloud->scalars, 1,
-                                                             &resident->buffers[PT_SCALARS]);
+                                : give_points(device, pt_scalar_bytes(cloud), cloud->scalars, &resident->buffers[PT_SCALARS]);
     if (error)
         return error;
     if (!cloud->colors)
         return PATINA_OK;
-    return device->ops->buffer_create(device, cloud->slots * pt_color_size(cloud->color_format), cloud->colors, 1,
-                                      &resident->buffers[PT_COLORS]);
+    return give_points(device, cloud->slots * pt_color_size(cloud->color_format), cloud->colors, &resident->buffers[PT_COLORS]);
 }
 
-static int upload(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+static int upload_all(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
+    int error = PATINA_OK;
     const struct {
         enum pt_instance_buffer which;
         const void *data;
@@ -79,27 +97,36 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         if (!parts[i].data)
             continue;
-        int error = device->ops->buffer_create(device, parts[i].size, parts[i].data, 1, &resident->buffers[parts[i].which]);
+        error = give_points(device, parts[i].size, parts[i].data, &resident->buffers[parts[i].which]);
         if (error)
             return error;
     }
     resident->pages = atomic_load(&cloud->alive->pages);
-    int error = upload_shapes(device, cloud, resident);
+    error = upload_shapes(device, cloud, resident);
     if (!error)
         error = upload_colors(device, cloud, resident);
-    if (!resident->buffers[PT_POSITIONS].wrapped) // a copy: the file itself need not be held beside it
+    if (!resident->buffers[PT_POSITIONS].wrapped && !device->ranges.most) // a copy: the file itself need not be held beside it
         pt_cloud_return(cloud);
     return error;
+}
+
+// Where the driver has no memory for it whole, from now on range by range.
+static int upload(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
+    const int error = upload_all(device, cloud, resident);
+    if (error != PATINA_ERROR_MEMORY || !device->copies || device->ranges.most)
+        return error;
+    drop(device, resident);
+    device->ranges.failed = pt_cloud_copied_bytes(cloud);
+    device->ranges.most = PT_RANGE_LEAST;
+    return upload_all(device, cloud, resident);
 }
 
 // What changed since it was uploaded.
 static int renew(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
-    if (resident->pages != atomic_load(&cloud->alive->pages)) {
-        for (int i = 0; i < PT_INSTANCE_BUFFERS; i++)
-            device->ops->buffer_destroy(device, &resident->buffers[i]);
-        device->ops->buffer_destroy(device, &resident->fields[0]);
-        device->ops->buffer_destroy(device, &resident->fields[1]);
+    if (resident->pages != atomic_load(&cloud->alive->pages) || !as_now(device, &resident->buffers[PT_POSITIONS])) {
+        drop(device, resident);
         return upload(device, cloud, resident);
     }
     int error = resident->shapes == atomic_load(&cloud->alive->shapes) ? PATINA_OK : upload_shapes(device, cloud, resident);
@@ -161,7 +188,8 @@ int pt_residency_mark(struct patina_device *device, const struct patina_cloud *c
     const enum pt_color_format format = cloud->color_format ? cloud->color_format : PT_COLOR_FLOAT;
     const size_t size = pt_color_size(format);
     const void *mark = format == PT_COLOR_FLOAT ? (const void *)linear_magenta : magenta;
-    if (resident->marked.size && resident->marked_colors == colors && resident->marked_shapes == shapes)
+    if (resident->marked.size && as_now(device, &resident->marked) && resident->marked_colors == colors &&
+        resident->marked_shapes == shapes)
         return PATINA_OK;
     device->ops->buffer_destroy(device, &resident->marked);
     char *words = malloc(cloud->slots * size);
@@ -172,7 +200,8 @@ int pt_residency_mark(struct patina_device *device, const struct patina_cloud *c
         const void *own = cloud->colors ? (const char *)cloud->colors + slot * size : (const void *)grey;
         memcpy(words + slot * size, marked ? mark : own, size);
     }
-    int error = device->ops->buffer_create(device, cloud->slots * size, words, 0, &resident->marked);
+    int error = device->ops->buffer_create(device, cloud->slots * size, words, how_points(device) & PT_IN_RANGES,
+                                           &resident->marked);
     free(words);
     resident->marked_colors = colors;
     resident->marked_shapes = shapes;
@@ -185,7 +214,7 @@ int pt_residency_field(struct patina_device *device, const struct patina_cloud *
     const struct pt_soft_code code = pt_soft_code(cloud, by, one);
     struct pt_buffer *field = &resident->fields[one];
     const uint32_t shapes = atomic_load(&cloud->alive->shapes);
-    if (field->size && (one || resident->field_shapes == shapes))
+    if (field->size && as_now(device, field) && (one || resident->field_shapes == shapes))
         return PATINA_OK;
     device->ops->buffer_destroy(device, field);
     uint32_t *words = malloc((cloud->slots + 1) * sizeof *words);
@@ -197,7 +226,8 @@ int pt_residency_field(struct patina_device *device, const struct patina_cloud *
             words[slot] = pt_soft_word(code, by ? by->steps[slot] : (uint32_t)PT_FIELD_MOST,
                                        one ? 1.0f : pt_soft_radius(cloud, chunk, slot));
     }
-    const int error = device->ops->buffer_create(device, cloud->slots * sizeof *words, words, 0, field);
+    const int error = device->ops->buffer_create(device, cloud->slots * sizeof *words, words, how_points(device) & PT_IN_RANGES,
+                                                 field);
     free(words);
     resident->field_shapes = one ? resident->field_shapes : shapes;
     return error;
@@ -218,7 +248,7 @@ int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device 
     if (!(resident = begin(device, mesh->alive)))
         return PATINA_ERROR_MEMORY;
     int error = device->ops->buffer_create(device, mesh->info.vertex_count * mesh->stride * sizeof *mesh->vertices,
-                                           mesh->vertices, 1, &resident->buffers[PT_MESH_VERTICES]);
+                                           mesh->vertices, PT_BORROW, &resident->buffers[PT_MESH_VERTICES]);
     if (!error)
         error = device->ops->buffer_create(device, 3 * mesh->info.triangle_count * sizeof *mesh->indices, mesh->indices, 1,
                                            &resident->buffers[PT_MESH_INDICES]);
@@ -233,8 +263,22 @@ int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device
         return PATINA_OK;
     if (!(resident = begin(device, alive)))
         return PATINA_ERROR_MEMORY;
-    const int error = size ? device->ops->buffer_create(device, size, data, 1, &resident->buffers[0]) : PATINA_OK;
+    const int error = size ? device->ops->buffer_create(device, size, data, PT_BORROW, &resident->buffers[0]) : PATINA_OK;
     return end(residency, device, resident, error, out);
+}
+
+int pt_residency_take_points(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive,
+                             const void *data, size_t size, struct pt_resident **out)
+{
+    struct pt_resident *resident = *out = find(residency, device, alive);
+    const int there = resident != NULL;
+    if (there && as_now(device, &resident->buffers[0]))
+        return PATINA_OK;
+    if (!resident && !(resident = begin(device, alive)))
+        return PATINA_ERROR_MEMORY;
+    drop(device, resident);
+    const int error = give_points(device, size, data, &resident->buffers[0]);
+    return there ? error : end(residency, device, resident, error, out);
 }
 
 int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device,

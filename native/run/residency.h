@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which clouds and meshes lie on a device. A CPU device borrows the cloud's memory, a GL device holds a copy until the cloud dies.
+// Which clouds and meshes lie on a device. A CPU device borrows the cloud's memory, a GL device holds a copy until the cloud dies, or,
+// where it has no room for that, asks for ranges of points whenever it needs them (device->ranges).
 #ifndef PT_RESIDENCY_H
 #define PT_RESIDENCY_H
 
 #include "plan/plan.h"
+
+enum { PT_RANGE_LEAST = 32 << 20 }; // bytes of a range, where a driver did not say how much memory there is
 
 struct pt_resident;
 
@@ -35,9 +38,12 @@ int pt_residency_see(struct patina_device *device, const struct patina_cloud *cl
 // Makes resident->fields[one] what the cloud's points are as soft ones: by a field, or all of them (NULL).
 int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, const struct patina_field *by,
                        struct pt_resident *resident, int one);
-// Likewise of what a mask or a grade holds: `size` bytes that live as long as `alive` says, in buffers[0], or none.
+// Likewise of what a mask holds: `size` bytes that live as long as `alive` says, in buffers[0], or none.
 int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive,
                             const void *data, size_t size, struct pt_resident **out);
+// Likewise of what a grade or a list of scans holds of each point: a device may have it in ranges.
+int pt_residency_take_points(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive,
+                             const void *data, size_t size, struct pt_resident **out);
 // Likewise of a mesh.
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
                            struct pt_resident **out);

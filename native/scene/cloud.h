@@ -135,6 +135,8 @@ struct pt_section {
 };
 void pt_cloud_sections(struct patina_cloud *cloud, struct pt_section sections[PT_ARRAYS]);
 uint64_t pt_cloud_mapped_bytes(const struct patina_cloud *cloud);
+uint64_t pt_cloud_copied_bytes(const struct patina_cloud *cloud);  // of what its points have, wherever it lies
+uint32_t pt_cloud_largest_chunk(const struct patina_cloud *cloud); // slots
 uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array); // of a point in the file; 0: not mapped
 // No page of the file is held any longer than until it is read again; any thread, whoever reads.
 void pt_cloud_return(const struct patina_cloud *cloud);

@@ -43,6 +43,25 @@ uint64_t pt_cloud_mapped_bytes(const struct patina_cloud *cloud)
     return bytes;
 }
 
+uint64_t pt_cloud_copied_bytes(const struct patina_cloud *cloud)
+{
+    struct patina_cloud copy;
+    struct pt_section sections[PT_ARRAYS];
+    uint64_t bytes = 0;
+    sections_of(cloud, &copy, sections);
+    for (int i = PT_ARRAY_POSITIONS; i <= PT_ARRAY_SHAPES; i++)
+        bytes += i != PT_ARRAY_ORDER && *sections[i].data ? sections[i].size : 0;
+    return bytes;
+}
+
+uint32_t pt_cloud_largest_chunk(const struct patina_cloud *cloud)
+{
+    uint32_t most = 0;
+    for (uint32_t i = 0; i < cloud->chunk_count; i++)
+        most = cloud->chunks[i].padded > most ? cloud->chunks[i].padded : most;
+    return most;
+}
+
 uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array)
 {
     static const uint8_t bytes[PT_ARRAYS] = {

@@ -4,6 +4,7 @@
 #include "shared/picture.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
+#include "lib/by_pixel.glsl"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
@@ -17,12 +18,13 @@ void main()
     uint x = args.view.rect[0] + gl_GlobalInvocationID.x, y = args.view.rect[1] + gl_GlobalInvocationID.y;
     if (x >= args.view.rect[2] || y >= args.view.rect[3])
         return;
-    uvec2 key = read_key(y * args.view.width + x);
+    uint at = y * args.view.width + x;
+    uvec2 key = read_key(at);
     uint id = key.x - args.instance.id_base, to = (y - args.crop_y) * args.crop_width + x - args.crop_x;
     bool ours = key.y != PT_KEY_EMPTY_Z && id < args.instance.id_count;
     if (!ours && args.first == 0u)
         return;
-    uint word = ours ? shapes[id] : 0u, sigma_class = word >> PT_SHAPE_SIGMA_SHIFT & PT_SHAPE_CLASS_BITS;
+    uint word = ours ? shapes[pt_place_of(id, at)] : 0u, sigma_class = word >> PT_SHAPE_SIGMA_SHIFT & PT_SHAPE_CLASS_BITS;
     precise float sure = float(word >> PT_SHAPE_CERTAINTY_SHIFT & 15u) * PT_CERTAINTY_STEP;
     precise float sigma = args.instance.spacing[sigma_class] * args.sigma_scale;
     if (args.certainty != 0u)

@@ -8,6 +8,7 @@
 #include "shared/words.h"
 #include "lib/planes.glsl"
 #include "lib/points.glsl"
+#include "lib/by_pixel.glsl"
 #include "lib/srgb.glsl"
 
 #if STEP == 0
@@ -29,7 +30,7 @@ layout(std430, binding = BIND_normal) buffer normal_block { vec4 normal[]; };
 layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { vec4 albedo[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
+layout(location = 1) uniform uint first_slot;  // where the bound part of what points have begins
 layout(location = 3) uniform int band_first;
 layout(location = 4) uniform int band_end;
 
@@ -112,7 +113,7 @@ void main()
         if (args.sifted != 0u && chunk.sifted != 0u &&
             (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
             continue;
-        uint id = chunk.first + i, word = surfels[id];
+        uint slot = chunk.first - first_slot + i, word = surfels[slot];
         if (chunk.cull != 0u && pt_faces_away(chunk, word, p))
             continue;
         float footprint = pt_footprint(view, z);
@@ -126,7 +127,7 @@ void main()
         int first_y = max(int(floor(low_y)) + 1 - view.origin_y, band_first);
         int last_y = min(int(floor(high_y)) - view.origin_y, band_end - 1);
         // 2. what it adds at weight 1
-        precise vec3 color = albedo_of(id);
+        precise vec3 color = albedo_of(slot);
         color = vec3(clamped(color.x), clamped(color.y), clamped(color.z)) * PT_SUM_SCALE;
         precise vec3 n = turned_normal(view, word, x, y) * PT_SUM_SCALE;
         // 3. to the pixels within whose surface is as deep
@@ -199,7 +200,7 @@ void main()
         return;
     float weight = sum_of(at + 6u);
     bool reached = 1.0 <= weight;
-    vec3 color = albedo_of(key.x - args.instance.id_base);
+    vec3 color = albedo_of(pt_place_of(key.x - args.instance.id_base, pixel));
     if (reached) {
         precise vec3 mean = vec3(sum_of(at), sum_of(at + 2u), sum_of(at + 4u)) * pt_rcp(weight);
         color = mean;

@@ -181,7 +181,7 @@ void add_pixel(view_args view, disc d, uint id, int x, int y, look l)
 look look_of(disc d)
 {
     look l;
-    precise float opaque = opacity_of(d.id) * PT_SUM_SCALE;
+    precise float opaque = opacity_of(d.id - first_slot) * PT_SUM_SCALE;
     l.opaque = opaque;
     for (uint k = 0u; k < PT_BLEND_LIGHTS; k++) {
         bool known = k < args.lights && discs[instance].shadowed != 0u;
@@ -197,8 +197,8 @@ look look_of(disc d) { return look(discs[instance].shadowed << 8u * (d.id & 3u))
 #else
 look look_of(disc d)
 {
-    vec3 rgb = albedo_of(d.id);
-    precise float opacity = opacity_of(d.id) * PT_SUM_SCALE;
+    vec3 rgb = albedo_of(d.id - first_slot);
+    precise float opacity = opacity_of(d.id - first_slot) * PT_SUM_SCALE;
     precise vec4 color = vec4(pt_max(pt_min(rgb.x, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
                               pt_max(pt_min(rgb.y, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
                               pt_max(pt_min(rgb.z, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity, opacity);

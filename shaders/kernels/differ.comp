@@ -39,7 +39,7 @@ void main()
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         if (!pt_point_of(chunk, i, point))
             continue;
-        uint scan = (scans[point.id >> 1] >> (16u * (point.id & 1u)) & (PT_DIFFER_MOST - 1u)) - args.first;
+        uint scan = (scans[point.slot >> 1] >> (16u * (point.slot & 1u)) & (PT_DIFFER_MOST - 1u)) - args.first;
         if (scan >= PT_DIFFER_SCANS)
             continue;
         float off = off_plane(args.view, point, read_float4(point.cell).xyz);

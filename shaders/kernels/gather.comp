@@ -28,7 +28,7 @@ layout(std430, binding = BIND_shadows) readonly buffer shadows_block { uint shad
 layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
+layout(location = 1) uniform uint first_slot;  // where the bound part of what points have begins
 
 #define POINT_COLOR(i) point_colors[i]
 #define LIGHTS args.light_count
@@ -40,7 +40,7 @@ layout(location = 1) uniform uint first_slot;  // where the bound part of positi
 struct point {
     float x, y, z, radius; // as in a record; before it has a place, the point's own
     float opacity;
-    uint f, id;
+    uint f, id, slot; // slot: of the bound part
 };
 
 // What its word holds; whether it is soft.
@@ -85,7 +85,7 @@ vec3 light(point p)
 {
     view_args view = args.view;
     vec3 style = vec3(args.instance.color[0], args.instance.color[1], args.instance.color[2]);
-    vec3 color = pt_gather_albedo(style, p.id, 0u);
+    vec3 color = pt_gather_albedo(style, p.slot, 0u);
     bool before = PT_SOFT_BEFORE < p.z;
     precise vec2 ray = vec2(p.x, p.y);
     if (view.perspective != 0u)
@@ -96,7 +96,7 @@ vec3 light(point p)
     if (args.recolor.source != 0u || args.recolor.graded != 0u)
         color = recolor(view, args.eye_z, ray, p.z, style, color);
 #if LIT
-    uint word = surfels[p.id];
+    uint word = surfels[p.slot];
     vec3 object = pt_decode_normal(word), n;
     for (int k = 0; k < 3; k++)
         n[k] = pt_dot(vec3(args.instance.normal_matrix[3 * k], args.instance.normal_matrix[3 * k + 1],
@@ -111,10 +111,10 @@ vec3 light(point p)
     return color;
 }
 
-float opacity_of(uint id)
+float opacity_of(uint slot)
 {
 #if OPACITY
-    uint value = (opacities[id >> 2] >> (8u * (id & 3u))) & 255u;
+    uint value = (opacities[slot >> 2] >> (8u * (slot & 3u))) & 255u;
     precise float opacity = args.instance.opacity * (float(value) * 0.00392156885936856); // 1 / 255
     return opacity;
 #else
@@ -144,8 +144,9 @@ void main()
         vec4 first = vec4(none), second = vec4(none);
         point p;
         p.id = chunk.first + i;
-        if (i < chunk.count && read_word(field[p.id], p) && place(chunk, i, p)) {
-            precise float opacity = p.opacity * opacity_of(p.id);
+        p.slot = p.id - first_slot;
+        if (i < chunk.count && read_word(field[p.slot], p) && place(chunk, i, p)) {
+            precise float opacity = p.opacity * opacity_of(p.slot);
             uint word = amount(p.f, opacity);
             if (word >> PT_SOFT_SHIFT != 0u) {
                 first = vec4(p.x, p.y, p.z, p.radius);

@@ -5,6 +5,7 @@
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/srgb.glsl"
+#include "lib/by_pixel.glsl"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
@@ -62,7 +63,7 @@ void main()
         return;
     float z = pt_float(key.y);
     if (args.color_target != 0u)
-        color[to] = blended(color[to], line_color(id, z), share);
+        color[to] = blended(color[to], line_color(pt_place_of(id, nearest[at]), z), share);
     if (args.depth != 0u && share >= 0.5)
         depth[to] = z;
 }

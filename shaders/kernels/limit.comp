@@ -5,6 +5,7 @@
 #include "shared/shadows.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
+#include "lib/by_pixel.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -22,7 +23,7 @@ void main()
     uvec2 key = read_key(at);
     bool some = key.y != PT_KEY_EMPTY_Z;
     if (some && args.loss == 255u) {
-        uint id = key.x - args.caster;
+        uint id = pt_place_of(key.x - args.caster, at);
         some = (opacities[id >> 2] >> 8u * (id & 3u) & 255u) != 255u;
     }
     precise float next = pt_float(PT_KEY_EMPTY_Z);

@@ -55,8 +55,8 @@ void main()
             continue;
         precise float weight = pt_max(1.0 - point.behind * pt_rcp(point.gamma), 0.0) * PT_SUM_SCALE;
         precise float share = pt_min(point.behind * pt_rcp(reach_of(args.view, point.gamma, point.nearest)), 1.0);
-        precise float opaque = opacity_of(point.id) * weight;
-        vec3 color = albedo_of(point.id);
+        precise float opaque = opacity_of(point.slot) * weight;
+        vec3 color = albedo_of(point.slot);
         precise vec3 shown = vec3(clamped(color.x), clamped(color.y), clamped(color.z)) * opaque;
         precise float across = weight * (point.x - floor(point.x)), up = weight * (point.y - floor(point.y)), deep = weight * share;
         add(point.at, weight);

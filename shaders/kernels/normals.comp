@@ -8,6 +8,7 @@
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
+#include "lib/by_pixel.glsl"
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { normals_args args; };
 layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
@@ -137,7 +138,7 @@ void normal_pixel(view_args view, int radius, bool steep, uint id_base, uint id_
     if (key.y == PT_KEY_EMPTY_Z || id >= id_count)
         return;
     float z = pt_float(key.y), w = linear_depth(view, z);
-    float spacing = args.instance.spacing[surfels[id] >> PT_SPACING_SHIFT];
+    float spacing = args.instance.spacing[surfels[pt_place_of(id, at)] >> PT_SPACING_SHIFT];
     float distance_limit = pt_layer_distance(view, d_min, spacing, z, 1.0);
     precise float slope = 4.0 * pt_footprint(view, z); // 76 degrees
     int column = int(x), row = int(y);

@@ -6,6 +6,7 @@
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
+#include "lib/by_pixel.glsl"
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { resolve_args args; };
 layout(location = 16) uniform float spacings[PT_SPACINGS]; // args.instance.spacing
@@ -41,7 +42,8 @@ void resolve_pixel(view_args view, instance_part instance, uint x, uint y)
         return;
     float z = pt_float(key.y);
     vec2 ray = pt_ray(view, int(x), int(y));
-    uint word = WORD(id);
+    uint place = pt_place_of(id, at);
+    uint word = WORD(place);
     float spacing = spacings[word >> PT_SPACING_SHIFT];
     // 2. its normal, in view space: the cloud's, or the estimate that the normal plane holds
     vec3 object = pt_decode_normal(word);
@@ -66,7 +68,7 @@ void resolve_pixel(view_args view, instance_part instance, uint x, uint y)
     normals[at] = vec4(unit, inverse);
     float by_spacing = pt_layer_distance(view, instance.d_min, spacing, z, inverse), distance_of = by_spacing;
 #if SIGMAS
-    uint sigma_class = (shapes[id] >> PT_SHAPE_SIGMA_SHIFT) & PT_SHAPE_CLASS_BITS;
+    uint sigma_class = (shapes[place] >> PT_SHAPE_SIGMA_SHIFT) & PT_SHAPE_CLASS_BITS;
     precise float sigma = spacings[sigma_class] * instance.sigma_scale;
     if (sigma_class != 0u)
         distance_of = pt_sure_distance(view, instance.d_min, sigma, spacing, z, inverse);

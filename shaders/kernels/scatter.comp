@@ -4,6 +4,7 @@
 // A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). The minimum commutes, so the order of points
 // never shows. Without 64-bit atomics a key is made in two passes over all points of all instances:
 //   PASS 0: least z;   PASS 1: least id among the points that have exactly this z.   PASS 2: both at once, 64 bits.
+//   RANGES: both passes run over a range of points before the next range comes: what was the least z is another's then.
 //   BEHIND, SIFTED: as in the arguments, known beforehand: software would read the limit and drawn words for nothing.
 // llvmpipe runs the vectors of a workgroup one after the other: a workgroup of one walks its chunk from end to end, and a pass
 // takes 5.2 ms in place of 7.6. Points and their words come as textures.
@@ -80,7 +81,12 @@ void main()
         // 5. the least key
         uint id = chunk.first + i;
 #if PASS == 0
+#if RANGES
+        if (z_bits < atomicMin(keys[2u * pixel + 1u], z_bits))
+            keys[2u * pixel] = PT_KEY_EMPTY_ID; // all who come here write this
+#else
         atomicMin(keys[2u * pixel + 1u], z_bits);
+#endif
 #elif PASS == 1
         atomicMin(keys[2u * pixel], chunk.id_base + id);
 #else

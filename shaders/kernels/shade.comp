@@ -13,6 +13,7 @@
 #include "lib/planes.glsl"
 #include "lib/srgb.glsl"
 #include "lib/tiles.glsl"
+#include "lib/by_pixel.glsl"
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { shade_args args; };
 #ifdef PT_SOFTWARE // as in surface
@@ -191,10 +192,10 @@ void main()
 #endif
         if (id < id_count && own.key.y != PT_KEY_EMPTY_Z) {
             // 2. colour and opacity
-            uint of_color = COLOR_FORMAT == 5 ? at : own.source;
-            float opacity = opacity_of(instance_opacity, id, of_color);
+            uint place = pt_place_of(id, at), of_color = COLOR_FORMAT == 5 ? at : own.source;
+            float opacity = opacity_of(instance_opacity, place, of_color);
             p.ray = pt_ray(view, x, y);
-            p.albedo = pt_gather_albedo(style, id, of_color);
+            p.albedo = pt_gather_albedo(style, place, of_color);
 #if RECOLOR
             p.albedo = recolor(view, eye_z, p.ray, p.z, style, p.albedo);
 #endif

@@ -7,6 +7,7 @@
 #include "shared/words.h"
 #include "lib/planes.glsl"
 #include "lib/points.glsl"
+#include "lib/by_pixel.glsl"
 #include "lib/shadow_words.glsl"
 
 layout(local_size_x = 64) in;
@@ -22,7 +23,7 @@ layout(std430, binding = BIND_differs) buffer differs_block { uint differs[]; };
 layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
+layout(location = 1) uniform uint first_slot;  // where the bound part of what points have begins
 
 bool on_map(view_args view, int x, int y) { return x >= 0 && y >= 0 && x < int(view.width) && y < int(view.height); }
 
@@ -66,7 +67,7 @@ bool supported(view_args view, int column, int row, float d, float z)
 // 2. d_eff of the point in this view; ray: where it falls.
 float layer_distance(view_args view, vec2 ray, float z, uint id, out bool none)
 {
-    uint word = surfels[id];
+    uint word = surfels[id - first_slot];
     vec3 object = pt_decode_normal(word), n;
     for (int k = 0; k < 3; k++)
         n[k] = pt_dot(vec3(args.instance.normal_matrix[3 * k], args.instance.normal_matrix[3 * k + 1],
@@ -117,7 +118,7 @@ uint loss_at(uint texel)
 {
     if (args.faint == 0u)
         return args.loss;
-    uint id = read_key(texel).x - args.caster;
+    uint id = pt_place_of(read_key(texel).x - args.caster, texel);
     return pt_shadow_share(args.loss, opacities[id >> 2] >> 8u * (id & 3u) & 255u);
 }
 

@@ -22,7 +22,7 @@ layout(std430, binding = BIND_field) readonly buffer field_block { uint field[];
 layout(std430, binding = BIND_scans) readonly buffer scans_block { uint scans[]; }; // two a word
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
+layout(location = 1) uniform uint first_slot;  // where the bound part of what points have begins
 
 #include "lib/clip.glsl"
 
@@ -65,10 +65,10 @@ void main()
         for (uint i = 0u; i < PT_SLOTS_A_WORD; i++) {
             uint slot = PT_SLOTS_A_WORD * w + i, at = 3u * base + slot;
             vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
-            bool keep = chunk.clip_keeps == 0u, cut = args.by_class != 0u && hidden_class(chunk.first + slot);
-            cut = cut || (args.by_shape != 0u && hidden_shape(chunk.first + slot));
-            cut = cut || (args.by_field != 0u && args.threshold < field[chunk.first + slot] >> PT_FIELD_SHIFT);
-            cut = cut || (args.by_scan != 0u && hidden_scan(chunk.first + slot));
+            bool keep = chunk.clip_keeps == 0u, cut = args.by_class != 0u && hidden_class(base + slot);
+            cut = cut || (args.by_shape != 0u && hidden_shape(base + slot));
+            cut = cut || (args.by_field != 0u && args.threshold < field[base + slot] >> PT_FIELD_SHIFT);
+            cut = cut || (args.by_scan != 0u && hidden_scan(base + slot));
             for (uint k = chunk.clip_first; k < keeps; k++)
                 keep = keep || inside(k, p);
             for (uint k = keeps; k < cuts; k++)

@@ -3,6 +3,7 @@
 #version 430 core
 #include "shared/effects.h"
 #include "lib/tiles.glsl"
+#include "lib/by_pixel.glsl"
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { value_args args; };
 layout(std430, binding = BIND_scalars) readonly buffer scalars_block { float scalars[]; };
@@ -19,7 +20,7 @@ void main()
         bool ours = key.y != PT_KEY_EMPTY_Z && id < args.instance.id_count;
         if (!ours && args.first == 0u)
             continue;
-        float scalar = ours ? scalars[id] : 0.0;
+        float scalar = ours ? scalars[pt_place_of(id, at)] : 0.0;
         bool known = ours && (pt_bits(scalar) & 0x7FFFFFFFu) < 0x7F800000u;
         precise float off = scalar - args.offset;
         off = pt_min(pt_max(off, -PT_VALUE_MOST), PT_VALUE_MOST);

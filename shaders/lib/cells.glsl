@@ -23,7 +23,7 @@ layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surf
 layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
+layout(location = 1) uniform uint first_slot;  // where the bound part of what points have begins
 layout(location = 3) uniform int band_first;
 layout(location = 4) uniform int band_end;
 
@@ -50,7 +50,7 @@ void add(uint at, float term)
 }
 
 struct pt_cell_point {
-    uint id, cell, at; // at: its cell's sums
+    uint slot, cell, at; // of the bound part; at: its cell's sums
     float x, y, z;     // cells from the picture's corner
     float nearest, gamma, behind;
 };
@@ -62,7 +62,7 @@ bool pt_point_of(chunk_view chunk, uint i, out pt_cell_point point)
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y + band_first), top = float(view.origin_y + band_end);
     // 1. where it lies
-    uint at = 3u * (chunk.first - first_slot) + i;
+    uint base = chunk.first - first_slot, at = 3u * base + i;
     vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
     vec3 seen = pt_project(view, chunk, p);
     float x = seen.x, y = seen.y, z = seen.z;
@@ -71,8 +71,8 @@ bool pt_point_of(chunk_view chunk, uint i, out pt_cell_point point)
     if (args.sifted != 0u && chunk.sifted != 0u &&
         (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
         return false;
-    point.id = chunk.first + i;
-    if (chunk.cull != 0u && pt_faces_away(chunk, surfels[point.id], p))
+    point.slot = base + i;
+    if (chunk.cull != 0u && pt_faces_away(chunk, surfels[point.slot], p))
         return false;
     // 2. on the nearest surface of its cell
     point.x = x;

@@ -14,7 +14,7 @@
 #include "lib/points.glsl"
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
+layout(location = 1) uniform uint first_slot;  // where the bound part of what points have begins
 layout(location = 2) uniform uint instance;    // whose points these are
 
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
@@ -55,19 +55,19 @@ const float pt_shape_ratios[32] = float[32](PT_SHAPE_RATIOS);
 bool disc_shaped() { return discs[instance].has_radii == PT_RADII_SHAPES && !(discs[instance].radius > 0.0); }
 
 // Radius and ratio. Below PT_DISC_LEAST: none.
-void disc_size(uint id, uint word, inout disc d)
+void disc_size(uint slot, uint word, inout disc d)
 {
     precise float radius = discs[instance].radius;
     d.shape = 0u;
     d.ratio = 1.0;
     if (disc_shaped()) {
-        d.shape = radii[id];
+        d.shape = radii[slot];
         radius = discs[instance].instance.spacing[d.shape & PT_SHAPE_CLASS_BITS];
         if (((d.shape >> PT_SHAPE_KIND_SHIFT) & 7u) == PT_KIND_SURFACE)
             radius = radius * discs[instance].surface_scale;
         d.ratio = pt_shape_ratios[(d.shape >> PT_SHAPE_RATIO_SHIFT) & 15u];
     } else if (!(radius > 0.0) && discs[instance].has_radii != 0u) {
-        precise float scaled = pt_float(radii[id]) * discs[instance].radius_scale;
+        precise float scaled = pt_float(radii[slot]) * discs[instance].radius_scale;
         radius = pt_min(scaled, PT_DISC_MOST);
     } else if (!(radius > 0.0)) {
         radius = discs[instance].instance.spacing[word >> PT_SPACING_SHIFT] * PT_DISC_SPACINGS;
@@ -290,10 +290,10 @@ bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
     d.y = y;
     d.z = z;
     d.id = chunk.first + slot;
-    uint word = surfels[d.id];
+    uint word = surfels[base + slot];
     if (chunk.cull != 0u && pt_faces_away(chunk, word, p))
         return false;
-    disc_size(d.id, word, d);
+    disc_size(base + slot, word, d);
     vec2 low, high;
     if (!disc_box(view, d, low, high))
         return false;

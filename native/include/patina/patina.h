@@ -124,7 +124,8 @@ typedef struct patina_device_desc {
     uint64_t memory_cap; // bytes of planes that a frame may hold (about 100 a pixel, 150 in transparent scenes); 0 = no limit
     // Bytes that a picture holds at a time of clouds that patina_cloud_open maps. More is read in rounds, and what was read is given
     // back; no picture changes by it. 0 = a third of the memory that is free when a picture begins; UINT64_MAX = no limit. OpenGL
-    // copies clouds whole: PATINA_ERROR_MEMORY where they take more than a cap that is given.
+    // copies clouds whole where they take no more than a cap that is given and the graphics memory has room; else it copies ranges of their
+    // points, as often as it needs them. PATINA_ERROR_MEMORY: a cap that has no room for two of them, some 300 KB.
     uint64_t mapped_cap;
 } patina_device_desc;
 
