@@ -218,6 +218,10 @@ class GridDesc(Descriptor):
                 ("row", c_void_p), ("station", c_double * 3)]
 
 
+class RowsInfo(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("whole", c_char * 80)]
+
+
 class MeshDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("position", Array), ("normal", Array),
                 ("color", Array), ("triangle_count", c_uint64), ("indices", c_void_p), ("uv", Array)]
@@ -351,6 +355,7 @@ CALLS = {
     "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
     "patina_builder_begin": (c_char_p, POINTER(BuilderDesc), POINTER(c_void_p)),
     "patina_builder_add": (c_void_p, POINTER(CloudDesc)),
+    "patina_builder_add_file": (c_void_p, c_void_p, c_char_p),
     "patina_builder_end": (c_void_p, c_void_p),
     "patina_builder_destroy": (c_void_p,),
     "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
@@ -366,6 +371,10 @@ CALLS = {
     "patina_file_read_stations": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
     "patina_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p),
+    "patina_rows_open": (c_char_p, c_void_p, POINTER(c_void_p)),
+    "patina_rows_get_info": (c_void_p, POINTER(RowsInfo)),
+    "patina_rows_next": (c_void_p, c_uint64, POINTER(c_void_p)),
+    "patina_rows_destroy": (c_void_p,),
     "patina_file_cloud": (c_void_p, c_uint32, c_void_p, POINTER(c_void_p)),
     "patina_cloud_load": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_write_ply": (c_char_p, POINTER(CloudDesc)),
@@ -419,9 +428,10 @@ RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_me
            "patina_progress_value": c_float, "patina_device_destroy": None, "patina_cloud_destroy": None,
            "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
            "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
-           "patina_builder_destroy": None, "patina_file_destroy": None, "patina_mesh_destroy": None,
-           "patina_texture_destroy": None, "patina_mask_destroy": None, "patina_grade_destroy": None,
-           "patina_scans_destroy": None, "patina_field_destroy": None, "patina_task_destroy": None}
+           "patina_builder_destroy": None, "patina_file_destroy": None, "patina_rows_destroy": None,
+           "patina_mesh_destroy": None, "patina_texture_destroy": None, "patina_mask_destroy": None,
+           "patina_grade_destroy": None, "patina_scans_destroy": None, "patina_field_destroy": None,
+           "patina_task_destroy": None}
 
 # effects.def: what Blender shows of each effect, and how
 EFFECTS = (

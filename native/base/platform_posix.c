@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // platform.h on Linux and macOS; what they do not share is in platform_linux.c and platform_macos.c.
+#include "pause.h"
 #include "platform.h"
 
 #include <dlfcn.h>
@@ -84,6 +85,12 @@ int pt_thread_start(struct pt_thread *thread, void (*main)(void *context), void 
 
 void pt_thread_join(struct pt_thread *thread) { pthread_join(*(pthread_t *)(void *)thread->room, NULL); }
 void pt_thread_yield(void) { sched_yield(); }
+
+void pt_pause(uint32_t milliseconds)
+{
+    const struct timespec time = {.tv_sec = milliseconds / 1000, .tv_nsec = milliseconds % 1000 * 1000000L};
+    nanosleep(&time, NULL);
+}
 
 static sigset_t interrupts(void)
 {

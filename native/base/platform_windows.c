@@ -2,6 +2,7 @@
 // platform.h on Windows 10 and later, with its own C library (UCRT). What takes paths takes them wide; no call here depends on the
 // process's code page.
 #define WIN32_LEAN_AND_MEAN
+#include "pause.h"
 #include "platform.h"
 
 #include <windows.h>
@@ -80,6 +81,8 @@ void pt_thread_join(struct pt_thread *thread)
 }
 
 void pt_thread_yield(void) { SwitchToThread(); }
+
+void pt_pause(uint32_t milliseconds) { Sleep(milliseconds); }
 
 static void (*watcher)(void);
 

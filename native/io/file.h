@@ -61,6 +61,13 @@ typedef int pt_file_opener(const char *path, bool alone, struct patina_progress 
 
 // Readers: fill a zeroed file. On failure the caller destroys what was filled.
 int pt_ply_read(struct patina_file *file, const struct pt_input *input);
+// A PLY's points in windows (ply_windows.c). begin: *why: why they cannot come so, and no rows; else NULL. The input lasts.
+struct ply_rows;
+int pt_ply_begin(const struct pt_input *input, struct ply_rows **out, const char **why);
+uint64_t pt_ply_count(const struct ply_rows *rows);
+// The next rows, count at most, into a zeroed file; none where all have come. *behind: where the input was read up to.
+int pt_ply_next(struct ply_rows *rows, uint64_t count, struct patina_file *file, uint64_t *behind);
+void pt_ply_end(struct ply_rows *rows);
 int pt_text_read(struct patina_file *file, const struct pt_input *input); // XYZ, CSV, PTS, PTX
 // Stanford's .conf: scans in files beside it (path: its own), each with its place. What cannot be read is told in the log and left
 // out; an error where nothing is left.
@@ -72,6 +79,10 @@ bool pt_text_is(const struct pt_input *input);
 // Takes over `staged`, 3 float64 a point from malloc: chooses the origin, narrows to file->position in place.
 // file->count must be set, file->origin holds what the file already declared (or 0) and is added to.
 void pt_file_place(struct patina_file *file, double *staged);
+// The same in two: the origin of all points, of which every (count / PT_ORIGIN_SAMPLES, rounded up)-th from the first on is looked at.
+enum { PT_ORIGIN_SAMPLES = 4096 };
+void pt_file_choose_origin(const double *staged, uint64_t count, double origin[3]);
+void pt_file_place_at(struct patina_file *file, double *staged, const double origin[3]);
 // Sets the box and invalid_positions from file->position.
 void pt_file_measure(struct patina_file *file);
 

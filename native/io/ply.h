@@ -51,6 +51,7 @@ struct ply_cursor {
     const struct ply_header *header;
     uint64_t offset, line; // of the next row
     enum ply_tone tone;
+    uint64_t before, all; // of a window: the element's rows that lie before it, and all of them; 0, 0: it is read whole
 };
 
 // Where the values of one vertex property go. data NULL: nowhere.
@@ -62,6 +63,18 @@ struct ply_target {
     double offset; // and this is added, of 8-bit columns
     bool wrap;     // negative values are bytes that a writer called signed: -1 is 255
 };
+
+// The element of the points; NULL: there is none.
+const struct ply_element *ply_find_points(const struct ply_header *header);
+// Rows of points alone, from the cursor on, which comes behind them: `window` is their element but for its count. origin: that positions are
+// taken relative to; of float32 no other than the header's. The input and header are those of the cursor.
+int ply_read_window(struct patina_file *file, const struct ply_element *window, struct ply_cursor *at, const double origin[3]);
+// Whether float32 may lose something of the positions: those of a window need an origin that was chosen for all.
+bool ply_is_fine(const struct ply_header *header, const struct ply_element *points);
+// Why the rows of points cannot be told one by one; NULL: they can.
+const char *ply_why_whole(const struct pt_input *input, const struct ply_header *header, const struct ply_element *points);
+// Whether a header of so many bytes tells of scans.
+bool ply_tells_of_scans(const struct pt_input *input, uint64_t header);
 
 // What a header of `header` bytes tells of the file's scans, once its points are read; what is wrong there is told in the log. PATINA_OK or
 // PATINA_ERROR_MEMORY, without words.
@@ -138,7 +151,8 @@ const char *ply_type_name(uint32_t type);
 bool ply_are_splats(const struct ply_property properties[], uint32_t count);
 // How a splat's colour differs by direction: nothing of it is read.
 bool ply_is_splat_rest(const char *name);
-// Scales and turns become discs: attributes "radius" and "opacity", and normals. PATINA_OK, or PATINA_ERROR_MEMORY without words.
+// Scales and turns become discs: attributes "radius" and "opacity", and normals. name: for the log, NULL: it is told already. PATINA_OK, or
+// PATINA_ERROR_MEMORY without words.
 int ply_make_discs(struct patina_file *file, const char *name);
 
 #endif

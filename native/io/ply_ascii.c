@@ -46,8 +46,8 @@ static int start_row(struct text *t, const struct ply_element *element, uint64_t
     for (skip_blanks(t); line_ends(t); skip_blanks(t)) {
         if (t->at == t->end)
             return ply_fault(t->cursor, "%s: the file ends at line %llu, behind %llu of the %llu rows of element %s",
-                             t->input->name, (unsigned long long)t->line, (unsigned long long)i,
-                             (unsigned long long)element->count, element->name);
+                             t->input->name, (unsigned long long)t->line, (unsigned long long)(t->cursor->before + i),
+                             (unsigned long long)(t->cursor->all ? t->cursor->all : element->count), element->name);
         next_line(t);
     }
     return PATINA_OK;

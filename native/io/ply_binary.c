@@ -123,8 +123,9 @@ static int read_fixed(struct bytes *b, const struct ply_property *properties, co
 static int ends_early(const struct bytes *b, const struct ply_element *element, uint64_t i)
 {
     return ply_fault(b->at, "%s: the file ends at byte %llu, inside row %llu of the %llu of element %s (from byte %llu on)",
-                     b->at->input->name, (unsigned long long)b->at->input->size, (unsigned long long)i,
-                     (unsigned long long)element->count, element->name, (unsigned long long)b->at->offset);
+                     b->at->input->name, (unsigned long long)b->at->input->size, (unsigned long long)(b->at->before + i),
+                     (unsigned long long)(b->at->all ? b->at->all : element->count), element->name,
+                     (unsigned long long)b->at->offset);
 }
 
 // The items of a list, handed on or passed over.
@@ -135,7 +136,7 @@ static int read_items(struct bytes *b, const struct ply_property *property, cons
     if (count < 0)
         return ply_fault(at, "%s: byte %llu: list %s of row %llu has the count %.0f", at->input->name,
                          (unsigned long long)(at->offset - pt_type_size(property->count_type)), property->name,
-                         (unsigned long long)i, count);
+                         (unsigned long long)(at->before + i), count);
     size_t item = pt_type_size(property->type);
     uint64_t size = (uint64_t)count * item; // below 2^35
     if (at->input->size - at->offset < size)

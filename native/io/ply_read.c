@@ -234,7 +234,7 @@ static int plan_attributes(struct plan *plan)
 
 // ---- the whole -----------------------------------------------------------------------------------------------------
 
-static const struct ply_element *find_points(const struct ply_header *header)
+const struct ply_element *ply_find_points(const struct ply_header *header)
 {
     static const char *const names[] = {"vertex", "vertices", "point", "points"};
     for (size_t n = 0; n < sizeof names / sizeof *names; n++)
@@ -370,11 +370,40 @@ static const struct ply_element *find_grid(const struct plan *plan)
     return NULL;
 }
 
-static int read_points(struct plan *plan)
+// What the file says of its points, and room for them.
+static int plan_points(struct plan *plan)
 {
     static const char *const formats[] = {"", "PLY ascii", "PLY binary_little_endian", "PLY binary_big_endian"};
     struct patina_file *file = plan->file;
-    struct ply_cursor at = {plan->input, plan->header, plan->header->body, plan->header->body_line, PLY_REFUSE};
+    file->count = plan->points->count;
+    snprintf(file->format, sizeof file->format, "%s", formats[plan->header->format]);
+    memcpy(file->origin, plan->header->origin, sizeof file->origin);
+    plan->properties = plan->header->properties + plan->points->first;
+    plan->targets = calloc(plan->points->properties + 1u, sizeof *plan->targets);
+    plan->taken = calloc(plan->points->properties + 1u, sizeof *plan->taken);
+    if (!plan->targets || !plan->taken)
+        return out_of_memory(plan);
+    plan->splats = ply_are_splats(plan->properties, plan->points->properties);
+    int code = plan_positions(plan);
+    if (!code)
+        code = plan_normals(plan);
+    if (!code)
+        code = plan_colors(plan);
+    return code ? code : plan_attributes(plan);
+}
+
+static void free_plan(struct plan *plan)
+{
+    free(plan->staged);
+    free(plan->targets);
+    free(plan->taken);
+}
+
+static int read_points(struct plan *plan)
+{
+    struct patina_file *file = plan->file;
+    struct ply_cursor at = {
+        .input = plan->input, .header = plan->header, .offset = plan->header->body, .line = plan->header->body_line};
     // Before a byte is allocated; again by the readers of the rows, where elements stand before the points.
     int code = ply_check_count(&at, plan->points);
     if (code)
@@ -382,16 +411,7 @@ static int read_points(struct plan *plan)
     if (plan->points->count > UINT32_MAX - 1)
         return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%s: %llu points, more than 2^32 - 2", plan->input->name,
                        (unsigned long long)plan->points->count);
-    file->count = plan->points->count;
-    snprintf(file->format, sizeof file->format, "%s", formats[plan->header->format]);
-    memcpy(file->origin, plan->header->origin, sizeof file->origin);
-    plan->targets = calloc(plan->points->properties + 1u, sizeof *plan->targets);
-    plan->taken = calloc(plan->points->properties + 1u, sizeof *plan->taken);
-    if (!plan->targets || !plan->taken)
-        return out_of_memory(plan);
-    plan->splats = ply_are_splats(plan->properties, plan->points->properties);
-    if ((code = plan_positions(plan)) || (code = plan_normals(plan)) || (code = plan_colors(plan)) ||
-        (code = plan_attributes(plan)))
+    if ((code = plan_points(plan)))
         return code;
     plan->faces = find_faces(plan);
     plan->grid = find_grid(plan);
@@ -423,19 +443,62 @@ int pt_ply_read(struct patina_file *file, const struct pt_input *input)
     if (code)
         goto done;
     plan.header = header;
-    plan.points = find_points(header);
+    plan.points = ply_find_points(header);
     if (!plan.points) {
         code = pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: the header declares no element vertex", input->name);
         goto done;
     }
-    plan.properties = header->properties + plan.points->first;
     code = read_points(&plan);
     if (!code && ply_read_scans(file, input, header->body))
         code = out_of_memory(&plan);
 done:
-    free(plan.staged);
-    free(plan.targets);
-    free(plan.taken);
+    free_plan(&plan);
     free(header);
     return code;
+}
+
+// ---- windows -------------------------------------------------------------------------------------------------------
+
+int ply_read_window(struct patina_file *file, const struct ply_element *window, struct ply_cursor *at, const double origin[3])
+{
+    struct plan plan = {.input = at->input, .file = file, .header = at->header, .points = window};
+    int code = plan_points(&plan);
+    if (!code)
+        code = ply_read_rows(at, window, plan.targets, NULL);
+    if (!code && plan.staged) {
+        pt_file_place_at(file, plan.staged, origin);
+        plan.staged = NULL;
+    }
+    if (!code && plan.splats && ply_make_discs(file, at->before ? NULL : at->input->name))
+        code = out_of_memory(&plan);
+    if (!code)
+        pt_file_measure(file);
+    free_plan(&plan);
+    return code;
+}
+
+bool ply_is_fine(const struct ply_header *header, const struct ply_element *points)
+{
+    bool fine = header->format == PLY_ASCII;
+    for (uint32_t k = points->first; k < points->first + points->properties; k++) {
+        const struct ply_property *p = &header->properties[k];
+        const bool place = !strcmp(p->name, "x") || !strcmp(p->name, "y") || !strcmp(p->name, "z");
+        fine |= place && (p->type == PATINA_FLOAT64 || p->type == PATINA_INT32 || p->type == PATINA_UINT32);
+    }
+    return fine;
+}
+
+const char *ply_why_whole(const struct pt_input *input, const struct ply_header *header, const struct ply_element *points)
+{
+    const struct plan plan = {.header = header, .points = points, .properties = header->properties + points->first};
+    int64_t found[FAMILY];
+    const bool normals = find_family(&plan, normal_names, sizeof normal_names / sizeof *normal_names, found);
+    for (const struct ply_element *e = header->elements; e < header->elements + header->element_count; e++) {
+        const bool faces = !strcmp(e->name, "face") || !strcmp(e->name, "faces") || !strcmp(e->name, "tristrips");
+        if (e->count && faces && !normals && ply_find_corners(header, e) >= 0)
+            return "its faces give the points their normals";
+        if (e->count && e > points && !strcmp(e->name, "range_grid"))
+            return "its range_grid gives the points their normals";
+    }
+    return ply_tells_of_scans(input, header->body) ? "its header tells of scans" : NULL;
 }

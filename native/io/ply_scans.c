@@ -106,6 +106,12 @@ static bool share_points(struct patina_file *file)
     return true;
 }
 
+bool ply_tells_of_scans(const struct pt_input *input, uint64_t header)
+{
+    const uint8_t *at = input->data, *stop;
+    return next_line(&at, input->data + header, &stop) != NULL;
+}
+
 int ply_read_scans(struct patina_file *file, const struct pt_input *input, uint64_t header)
 {
     const uint8_t *const end = input->data + header, *at = input->data, *line, *stop;

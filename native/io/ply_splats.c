@@ -118,9 +118,11 @@ int ply_make_discs(struct patina_file *file, const char *name)
         free(radius);
         return code;
     }
-    pt_log(PT_LOG_WARNING,
-           "%s: Gaussian splats, taken as discs of even colour: what their colour does by direction, and their soft rims, are "
-           "left out",
-           name);
+    if (name)
+        pt_log(
+            PT_LOG_WARNING,
+            "%s: Gaussian splats, taken as discs of even colour: what their colour does by direction, and their soft rims, are "
+            "left out",
+            name);
     return pt_file_add_attribute(file, "radius", PATINA_FLOAT32, radius);
 }

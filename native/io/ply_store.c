@@ -90,8 +90,8 @@ int ply_check_count(const struct ply_cursor *at, const struct ply_element *eleme
         return PATINA_OK;
     return ply_fault(
         at, "%s: cut short: element %s declares %llu rows of at least %llu bytes, but only %llu bytes follow from byte %llu on",
-        at->input->name, element->name, (unsigned long long)element->count, (unsigned long long)row, (unsigned long long)there,
-        (unsigned long long)at->offset);
+        at->input->name, element->name, (unsigned long long)(at->all ? at->all : element->count), (unsigned long long)row,
+        (unsigned long long)there, (unsigned long long)at->offset);
 }
 
 int ply_fault(const struct ply_cursor *at, const char *format, ...)

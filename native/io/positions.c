@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SAMPLES = 4096 }; // positions looked at to choose an origin
+enum { SAMPLES = PT_ORIGIN_SAMPLES };
 
 // float32 may move a coordinate by this part of the cloud's size. A half step of float32 is 6e-8 of the number, so a
 // cloud around zero never needs an origin; 1 km at 5,000,000 m (half a step: 0.25 m) does.
@@ -42,7 +42,7 @@ static uint32_t sample(const double *staged, uint64_t count, double axes[3][SAMP
 // The rule: take the middle half of the sample on each axis (a survey often holds stray points at zero, which say
 // nothing about where it lies). Where float32 would move one of these coordinates by more than allowed_loss of their
 // box's diagonal, the origin is the median, rounded down to whole units; else it is zero.
-static void choose_origin(const double *staged, uint64_t count, double origin[3])
+void pt_file_choose_origin(const double *staged, uint64_t count, double origin[3])
 {
     memset(origin, 0, 3 * sizeof(double));
     double(*axes)[SAMPLES] = malloc(3 * sizeof *axes);
@@ -69,7 +69,12 @@ static void choose_origin(const double *staged, uint64_t count, double origin[3]
 void pt_file_place(struct patina_file *file, double *staged)
 {
     double origin[3];
-    choose_origin(staged, file->count, origin);
+    pt_file_choose_origin(staged, file->count, origin);
+    pt_file_place_at(file, staged, origin);
+}
+
+void pt_file_place_at(struct patina_file *file, double *staged, const double origin[3])
+{
     // In place: float i is written where double i / 2 was, which has been read. Bytes, so that no compiler may reorder.
     unsigned char *bytes = (unsigned char *)staged;
     for (uint64_t i = 0; i < 3 * file->count; i++) {

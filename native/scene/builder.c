@@ -89,6 +89,9 @@ int patina_builder_begin(const char *path, const patina_builder_desc *given, pat
     int error = pt_take(NULL, "patina_builder_begin", given, &desc, sizeof desc);
     if (error)
         return error;
+    if (desc.count > 0x7FFFFFFFull)
+        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%s: %llu points are more than 2147483647, split it", path,
+                       (unsigned long long)desc.count);
     const uint64_t memory = desc.memory ? desc.memory : pt_free_memory() / 3;
     desc.memory = memory > LEAST_MEMORY ? memory : LEAST_MEMORY;
     struct patina_builder *builder = calloc(1, sizeof *builder);

@@ -51,43 +51,48 @@ static int ends_in(const char *path, const char *ending)
     return length > size && !strcmp(path + length - size, ending);
 }
 
-// Built and analysed: what `render` would make of the file each time.
-static int convert_to_cloud(const char *in, const char *out, const char *attribute)
+static int parse_options(int count, char **arguments, struct tool_build *build)
 {
-    struct tool_color color = {.source = attribute ? PATINA_COLOR_SCALAR : PATINA_COLOR_OWN};
-    struct tool_stations stations = {0};
-    patina_analysis_desc desc = {.struct_size = sizeof desc, .keep_normals = 1};
-    patina_progress *progress = NULL;
-    patina_cloud *cloud = NULL;
-    snprintf(color.attribute, sizeof color.attribute, "%s", attribute ? attribute : "");
-    int code = patina_progress_create(&progress);
-    tool_cancellable(progress, NULL);
-    if (!code)
-        code = tool_load_cloud(in, &color, "", progress, &cloud, NULL, &stations, NULL);
-    tool_describe_stations(&stations, &desc);
-    desc.free_space = desc.station_count > 1; // one alone sees through nothing
-    if (!code)
-        code = patina_cloud_analyse(cloud, &desc, progress);
-    int result = code ? tool_failed(in, NULL, code) : TOOL_OK;
-    tool_cancellable(NULL, NULL);
-    if (!result && (code = patina_cloud_save(cloud, out)))
-        result = tool_failed(out, cloud, code);
-    tool_free_stations(&stations);
-    tool_drain_log(1);
-    patina_cloud_destroy(cloud);
-    patina_progress_destroy(progress);
-    return result;
+    static const char *const choices[] = {"auto", "on", "off"}; // in the order of tool_analysis
+    for (int i = 0; i < count; i += 2) {
+        const char *name = arguments[i], *value = i + 1 < count ? arguments[i + 1] : NULL;
+        if (strcmp(name, "--attribute") != 0 && strcmp(name, "--memory") != 0 && strcmp(name, "--analysis") != 0)
+            return tool_misuse("convert: there is no option '%s'", name);
+        if (!value)
+            return tool_misuse("%s: a value, please", name);
+        int bad = 0;
+        if (!strcmp(name, "--attribute")) {
+            build->attribute = value;
+        } else if (!strcmp(name, "--memory")) {
+            bad = tool_parse_memory(value, &build->memory);
+        } else {
+            bad = -1;
+            for (uint32_t k = 0; k < 3; k++)
+                if (!strcmp(value, choices[k])) {
+                    build->analysis = k;
+                    bad = 0;
+                }
+        }
+        if (bad)
+            return tool_misuse("%s: '%s' is no value of it", name, value);
+    }
+    return TOOL_OK;
 }
 
 int tool_convert(int count, char **arguments)
 {
-    const char *attribute = count == 4 && !strcmp(arguments[2], "--attribute") ? arguments[3] : NULL;
-    if (count != 2 && !attribute)
+    struct tool_build build = {0};
+    if (count < 2)
         return tool_misuse("convert: a file to read and a file to write, please");
-    if (ends_in(arguments[1], ".cloud"))
-        return convert_to_cloud(arguments[0], arguments[1], attribute);
-    if (attribute)
-        return tool_misuse("--attribute goes into a .cloud");
+    build.in = arguments[0];
+    build.out = arguments[1];
+    const int misused = parse_options(count - 2, arguments + 2, &build);
+    if (misused)
+        return misused;
+    if (ends_in(build.out, ".cloud"))
+        return tool_convert_to_cloud(&build);
+    if (count > 2)
+        return tool_misuse("%s goes into a .cloud", arguments[2]);
     patina_progress *progress = NULL;
     patina_file *file = NULL;
     void *columns[3] = {NULL, NULL, NULL};

@@ -44,7 +44,7 @@ static int parse_count(const char *text, uint32_t least, uint32_t most, uint32_t
 }
 
 // Bytes, of at least a megabyte: 500M, 2G, 1.5G.
-static int parse_memory(const char *text, uint64_t *bytes)
+int tool_parse_memory(const char *text, uint64_t *bytes)
 {
     char *end;
     const double number = strtod(text, &end);
@@ -248,7 +248,7 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     else if (!strcmp(name, "--batch"))
         bad = parse_count(value, 0, UINT32_MAX, &o->batch);
     else if (!strcmp(name, "--memory"))
-        bad = parse_memory(value, &o->memory);
+        bad = tool_parse_memory(value, &o->memory);
     else if (!strcmp(name, "--size"))
         bad = parse_size(value, &s->width, &s->height);
     else if (!strcmp(name, "--region"))

@@ -120,6 +120,8 @@ struct tool_options {
 
 // Reads between `least` and `most` numbers separated by commas. Returns how many, or -1.
 int parse_numbers(const char *text, double *numbers, int least, int most);
+// Bytes, of at least a megabyte: 500M, 2G, 1.5G. 0, or -1.
+int tool_parse_memory(const char *text, uint64_t *bytes);
 // Options of effects (effects.c): 0 good, -1 a bad value, 1 no such option.
 int tool_parse_effect(const char *name, const char *value, patina_effects *effects);
 void tool_print_effects(FILE *out); // the lines that tell of them
@@ -147,6 +149,14 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
 
 // Whether a file can be read and begins with these bytes, 16 at most.
 int tool_begins(const char *path, const char *bytes, size_t size);
+
+// What `convert` does where a built cloud is written.
+struct tool_build {
+    const char *in, *out, *attribute; // attribute: NULL: none
+    uint64_t memory;                  // bytes; 0: automatic
+    uint32_t analysis;                // tool_analysis, but for the grid's
+};
+int tool_convert_to_cloud(const struct tool_build *build); // a tool_exit
 
 // ---- clouds --------------------------------------------------------------------------------------------------------
 

@@ -2,6 +2,9 @@
 """Files of points on the command line: tests that test_cli.py, the script that runs, takes in."""
 
 import random
+import struct
+import subprocess
+import time
 
 import __main__ as cli
 
@@ -102,3 +105,88 @@ def test_convert_keeps_a_survey_origin():
 
 
 # ---- pictures ------------------------------------------------------------------------------------------------------
+
+
+def binary(name, count, form="<fff", row=lambda i: (i % 211 * 0.01, i // 211 * 0.01, 0.3 * random.random()), said=None, end=b""):
+    """A PLY of x, y, z and, where the row has more, heat; said: the rows that its header declares."""
+    random.seed(5)
+    words = {"f": "float", "d": "double"}
+    names = "".join(f"property {words[kind]} {column}\n" for kind, column in zip(form[1:], ("x", "y", "z", "heat"), strict=False))
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {said or count}\n{names}end_header\n"
+    (cli.FOLDER / name).write_bytes(head.encode() + b"".join(struct.pack(form, *row(i)) for i in range(count)) + end)
+    return name
+
+
+def left(*names):
+    """What lies in the folder beside these, of the builds of `out`."""
+    return sorted(path.name for path in cli.FOLDER.glob("*out.cloud*") if path.name not in names)
+
+
+def test_convert_to_a_cloud():
+    """The same bytes whatever memory it may take, from text and bytes alike, with an attribute or analysis or not; it renders as its file."""
+    places = [(i % 150 * 0.01, i // 150 * 0.01, 0.1 * (i % 7)) for i in range(15000)]
+    binary("b.ply", 15000, "<ffff", lambda i: (*places[i], i % 10))
+    rows = "".join(f"{struct.unpack('f', struct.pack('f', x))[0]!r} {struct.unpack('f', struct.pack('f', y))[0]!r} "
+                   f"{struct.unpack('f', struct.pack('f', z))[0]!r} {i % 10}\n" for i, (x, y, z) in enumerate(places))
+    (cli.FOLDER / "a.ply").write_text("ply\nformat ascii 1.0\nelement vertex 15000\nproperty float x\nproperty float y\nproperty float z\n"
+                                      f"property float heat\nend_header\n{rows}")
+    (cli.FOLDER / "t.csv").write_text("x,y,z,heat\n" + rows.replace(" ", ","))
+    for options in ([], ["--analysis", "off"], ["--attribute", "heat", "--analysis", "on"]):
+        found = []
+        for name, more in (("b.ply", []), ("b.ply", ["--memory", "64M"]), ("a.ply", []), ("t.csv", [])):
+            said = cli.run("convert", name, "out.cloud", *options, *more).stderr
+            assert ("t.csv is read whole: what the columns of a text hold" in said) == (name == "t.csv"), said
+            found.append((cli.FOLDER / "out.cloud").read_bytes())
+        assert all(one == found[0] for one in found), [len(one) for one in found]
+        assert not left("out.cloud"), left("out.cloud")
+        cli.run("render", "out.cloud", "-o", "cloud.png", "--size", "64x64")
+        cli.run("render", "b.ply", "-o", "file.png", "--size", "64x64")
+        assert (cli.FOLDER / "cloud.png").read_bytes() == (cli.FOLDER / "file.png").read_bytes(), options
+    cli.run("render", "out.cloud", "-o", "cloud.png", "--ramp", "heat")
+    assert "no attribute 'cold'" in cli.run("convert", "b.ply", "no.cloud", "--attribute", "cold", code=1).stderr
+    assert "built without" not in cli.run("convert", "b.ply", "out.cloud", "--memory", "1M").stderr
+    for bad in (["--memory", "x"], ["--analysis", "grid"], ["--memory"], ["--colour", "1"]):
+        cli.run("convert", "b.ply", "no.cloud", *bad, code=2)
+    assert "goes into a .cloud" in cli.run("convert", "b.ply", "no.ply", "--memory", "1G", code=2).stderr
+    assert not (cli.FOLDER / "no.cloud").exists() and not (cli.FOLDER / "no.ply").exists()
+
+
+def test_convert_bad_files():
+    """Cut short in the middle, rows of NaN, rows too many, a text whose middle is no number: one message each, and no file by that name
+    but the one from before."""
+    before = b"what was there"
+    out = cli.FOLDER / "out.cloud"
+    for name, words, code in ((binary("cut.ply", 3000, said=9000), "cut short: element vertex declares 9000 rows", 1),
+                              (binary("one.ply", 1, said=4000000000), "declares 4000000000 rows", 1),
+                              ("none.ply", "none.ply: cannot be read", 1)):
+        out.write_bytes(before)
+        said = cli.run("convert", name, "out.cloud", code=code).stderr
+        assert words in said and name in said and len(said.splitlines()) == 1, said
+        assert out.read_bytes() == before and not left("out.cloud"), left("out.cloud")
+    (cli.FOLDER / "word.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                                         "end_header\n1 2 3\n4 five 6\n7 8 9\n")
+    assert "line 9: 'five' is not a number" in cli.run("convert", "word.ply", "out.cloud", code=1).stderr
+    assert out.read_bytes() == before
+    nowhere = binary("nan.ply", 5000, row=lambda i: (i % 50, i // 50, float("nan") if i % 100 == 3 else 0.0))
+    assert "50 points of nan.ply are nowhere" in cli.run("convert", nowhere, "out.cloud").stderr
+    assert "warning: more.ply: 7 bytes follow behind" in cli.run("convert", binary("more.ply", 5000, end=b"1234567"), "out.cloud").stderr
+    said = cli.run("convert", binary("far.ply", 1), "no/such/out.cloud", code=1).stderr
+    assert "no/such/out.cloud" in said, said
+
+
+def test_convert_is_killed():
+    """At any moment: what was there before stays, and the next run makes the whole file."""
+    binary("long.ply", 60000)
+    out = cli.FOLDER / "out.cloud"
+    begin = time.monotonic()
+    cli.run("convert", "long.ply", "out.cloud")
+    takes, wanted = time.monotonic() - begin, out.read_bytes()
+    out.write_bytes(b"before")
+    for i in range(8):
+        process = subprocess.Popen([cli.PATINA, "convert", "long.ply", "out.cloud"], cwd=cli.FOLDER, stderr=subprocess.DEVNULL)
+        time.sleep(takes * (i + 0.5) / 8)
+        process.kill()
+        process.wait()
+        assert out.read_bytes() in (b"before", wanted), i
+    cli.run("convert", "long.ply", "out.cloud")
+    assert out.read_bytes() == wanted and not left("out.cloud"), left("out.cloud")

@@ -38,6 +38,9 @@ PATINA_API int patina_builder_begin(const char *path, const patina_builder_desc 
 // The next points: numbered in the order that they come in. Arrays are copied; which there are, their types and the origin are those of
 // the first piece with any points. threads is ignored. At most 2147483647 points in all.
 PATINA_API int patina_builder_add(patina_builder *builder, const patina_cloud_desc *piece);
+// The same of a file's points, or of one of its windows: what patina_file_cloud makes of them, and the attribute `scalar`, in its order;
+// NULL: none.
+PATINA_API int patina_builder_add_file(patina_builder *builder, const patina_file *file, const char *scalar);
 // Writes the file; once, and nothing may be added then. progress: may be NULL; stops it too. After an error there is no file but the
 // one that was there before.
 PATINA_API int patina_builder_end(patina_builder *builder, patina_progress *progress);

@@ -82,6 +82,22 @@ typedef struct patina_grid_desc {
 // Normals as patina_file_open finds them in grids, towards the scanner, 3 a point into `normals`; 0 0 0 where a point lies in no
 // surface, and everywhere where the grid is nearly empty.
 PATINA_API int patina_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals);
+// A file whose points come in windows, so that it need not be in memory: those of a PLY of any size, but for one whose faces or
+// range_grid give its points their normals, or whose header tells of scans. All windows together are what patina_file_open gives of it,
+// relative to the same origin. Every other file is read whole, and is one window.
+typedef struct patina_rows patina_rows;
+typedef struct patina_rows_info {
+    size_t struct_size;
+    uint64_t count; // points, as its header says; 0 where the file is read whole: not known yet
+    char whole[80]; // why it is read whole; "": it comes in windows
+} patina_rows_info;
+// Errors as patina_file_open has them: what is seen at once is told here, the rest with its window. Points that are not there are
+// an error, once those before them were given. progress: of all windows; may be NULL. next: NULL behind the last, else the caller's.
+PATINA_API int patina_rows_open(const char *path, patina_progress *progress, patina_rows **out);
+PATINA_API int patina_rows_get_info(const patina_rows *rows, patina_rows_info *info);
+PATINA_API int patina_rows_next(patina_rows *rows, uint64_t most, patina_file **out);
+PATINA_API void patina_rows_destroy(patina_rows *rows);
+
 // Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
 // gives it classes. One of splats has their opacities and radii.
 PATINA_API int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out);
