@@ -37,6 +37,7 @@ int pt_execute(struct pt_execution *e)
     e->behind = calloc((size_t)plan->instance_count + 1, sizeof *e->behind);
     if (!error && (!e->late || !e->behind))
         error = pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    error = error ? error : pt_pager_begin(e->pager, plan);
     e->stale = plan->light_count && pt_shadows_stale(e->binder.shadows, e->scene, plan);
     return error || !plan->step_count ? error : pt_walk(e, plan->steps, plan->steps + plan->step_count);
 }

@@ -4,11 +4,12 @@
 
 #include "execute.h"
 #include "frame_samples.h"
+#include "page_check.h"
 
 #include <math.h>
 #include <string.h>
 
-int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
+static int bake_once(struct patina_frame *frame, const struct patina_scene *scene)
 {
     struct patina_scene whole = *scene; // its handle is not touched
     struct pt_plan plan;
@@ -34,7 +35,16 @@ int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
     atomic_store(&frame->cancel, 0);
     if (error == PATINA_ERROR_CANCELLED)
         return pt_fail(&frame->handle, error, "baking shadows was cancelled");
-    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+    return error == PT_AGAIN ? error : error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
+{
+    int error;
+    do
+        error = bake_once(frame, scene);
+    while (error == PT_AGAIN);
+    return error;
 }
 
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene)

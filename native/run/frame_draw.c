@@ -3,6 +3,7 @@
 #include "frame.h"
 
 #include "execute.h"
+#include "page_check.h"
 
 #include <math.h>
 #include <string.h>
@@ -105,6 +106,7 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
     frame->keys_valid = 0;
     link_planes(frame);
     frame->layers[0] = (struct pt_layer){.points = plan->points_scattered};
+    frame->pager.unchecked = frame->merge != NULL;
     int error = pt_shadows_open(frame->device, &frame->shadows, scene, plan);
     if (!error && !(error = pt_pager_open(&frame->pager, frame->device, scene))) {
         error = pt_execute(&execution);
@@ -129,7 +131,7 @@ int pt_frame_share_planes(const struct patina_frame *frame, struct pt_plan *plan
     return pt_plan_share_planes(plan, &abilities, frame->planes.apart);
 }
 
-int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
+static int draw_once(struct patina_frame *frame, const struct patina_scene *scene)
 {
     struct pt_plan plan;
     const double start = pt_milliseconds();
@@ -155,5 +157,15 @@ int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
     pt_plan_destroy(&plan);
     if (error == PATINA_ERROR_CANCELLED)
         return pt_fail(&frame->handle, error, "rendering was cancelled");
-    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+    return error == PT_AGAIN ? error : error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+// Each time over there are more pages that are known to be damaged, and left out.
+int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
+{
+    int error;
+    do
+        error = draw_once(frame, scene);
+    while (error == PT_AGAIN);
+    return error;
 }

@@ -5,6 +5,7 @@
 
 #include "execute.h"
 #include "merge.h"
+#include "page_check.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -192,7 +193,7 @@ static int begin(struct part_job *job, struct pt_keys_head *head)
     return PATINA_OK;
 }
 
-int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scene, const patina_part *part, const char *path)
+static int scatter_once(struct patina_frame *frame, const struct patina_scene *scene, const patina_part *part, const char *path)
 {
     struct part_job job = {.frame = frame, .scene = scene, .part = part, .planes = {.varies = 1}};
     struct pt_keys_head head;
@@ -219,7 +220,16 @@ int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scen
     atomic_store(&frame->cancel, 0);
     if (error == PATINA_ERROR_CANCELLED)
         return pt_fail(&frame->handle, error, "scattering was cancelled");
-    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+    return error == PT_AGAIN ? error : error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scene, const patina_part *part, const char *path)
+{
+    int error;
+    do
+        error = scatter_once(frame, scene, part, path);
+    while (error == PT_AGAIN);
+    return error;
 }
 
 int pt_frame_merge(struct patina_frame *frame, const struct patina_scene *scene, const char *const *paths, uint32_t count,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pager.h"
 
+#include "page_check.h"
+
 #include "base/platform.h"
 #include "residency.h"
 
@@ -156,6 +158,35 @@ static void look(void *context)
         make_room(pager, pager->cap / 8 * (8 - FULL_EIGHTHS));
 }
 
+// ---- damaged pages -------------------------------------------------------------------------------------------------------
+
+// Where all fits, of a chunk that a pass walks all that the file has; else, for it would be read in vain, what says where its points are.
+static uint32_t looked_at(const struct pt_pager *pager) { return pager->cap ? 1u << PT_ARRAY_POSITIONS : UINT32_MAX; }
+
+// What a pass reads of files: of a range, and where some of that is damaged, of all others too, for the picture is planned once more then.
+static int check_range(const struct pt_pager *pager, const struct pt_chunk_list *lists, uint32_t count,
+                       const struct pt_chunk_range *range)
+{
+    if (pager->unchecked)
+        return PATINA_OK;
+    const int found = pt_check_range(lists, range, looked_at(pager));
+    if (found != PT_AGAIN)
+        return found;
+    const struct pt_chunk_range all = {.end_list = count};
+    const int more = pt_check_range(lists, &all, looked_at(pager));
+    return more < 0 ? more : PT_AGAIN;
+}
+
+static int check_clouds(const struct patina_scene *scene)
+{
+    int found = PATINA_OK;
+    for (uint32_t i = 0; i < scene->cloud_count && found >= 0; i++) {
+        const int one = pt_check_cloud(scene->instances[i].cloud);
+        found = one ? one : found;
+    }
+    return found;
+}
+
 int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const struct patina_scene *scene)
 {
     pager->device = device;
@@ -165,6 +196,11 @@ int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const st
     const int error = device->copies ? open_copies(pager, device) : PATINA_OK;
     if (error)
         return error;
+    if (device->copies && pager->mapped && !pager->cap && !pager->unchecked) { // it takes all of them
+        const int damaged = check_clouds(scene);
+        if (damaged)
+            return damaged;
+    }
     if (!pager->cap || !pager->mapped)
         return PATINA_OK;
     give_back(pager);
@@ -190,6 +226,26 @@ void pt_pager_close(struct pt_pager *pager)
 }
 
 // ---- rounds --------------------------------------------------------------------------------------------------------------
+
+int pt_pager_begin(struct pt_pager *pager, const struct pt_plan *plan)
+{
+    if (!pager || !pager->mapped || !pager->device->copies || !pager->cap || pager->unchecked)
+        return PATINA_OK;
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < plan->pass_count && !error; i++) {
+        const struct pt_pass *pass = &plan->passes[i];
+        struct pt_chunk_list *lists = calloc(pass->ref_count + 1u, sizeof *lists);
+        if (!lists)
+            return PATINA_ERROR_MEMORY;
+        const uint32_t count = pt_pass_lists(plan, pass, lists);
+        for (struct pt_chunk_range range = {0}; !error && pt_next_range(lists, count, pager->round, &range);) {
+            make_room(pager, range.bytes);
+            error = check_range(pager, lists, count, &range);
+        }
+        free(lists);
+    }
+    return error;
+}
 
 // What a range of lists is of one of them: [first, end).
 static void part_of(const struct pt_chunk_list *lists, const struct pt_chunk_range *range, uint32_t list, uint32_t *first,
@@ -252,7 +308,8 @@ static int run_ranges(struct pt_pager *pager, const struct bound *bound, struct 
         if (some)
             expect(bound->lists, bound->count, &next);
         make_room(pager, range.bytes);
-        error = run_range(bound, whole, &range, run, context);
+        error = check_range(pager, bound->lists, bound->count, &range);
+        error = error ? error : run_range(bound, whole, &range, run, context);
         range = next;
     }
     return error;
@@ -287,7 +344,9 @@ int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struc
         memcpy(bound.buffers, buffers, pass->ref_count * sizeof *bound.buffers);
         error = run_ranges(pager, &bound, buffers, run, context);
     } else { // in one, which need not be held whole: whoever runs it looks after that
-        error = run(context, buffers);
+        const struct pt_chunk_range all = {.end_list = bound.count};
+        error = bound.lists ? check_range(pager, bound.lists, bound.count, &all) : PATINA_OK;
+        error = error ? error : run(context, buffers);
     }
     free(bound.lists);
     free(bound.parts);

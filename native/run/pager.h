@@ -18,12 +18,16 @@ struct pt_pager {
     atomic_uint returned;
     uint64_t mapped, read;
     uint32_t rounds;
+    int unchecked; // pages are taken as they are: of parts that are merged others have read them
 };
 
+// Pages that are read for the first time are looked at: what begins, opens and runs may return PT_AGAIN (page_check.h).
 // Finds the cap: the device's, or of the memory that is free. PATINA_ERROR_MEMORY, with its message at the device, where this copies
 // clouds and they exceed a cap that was given. What was counted goes on.
 int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const struct patina_scene *scene);
 void pt_pager_close(struct pt_pager *pager);
+// Before the plan runs: a device that copies clouds in ranges reads what its passes walk, which is looked at here.
+int pt_pager_begin(struct pt_pager *pager, const struct pt_plan *plan);
 // The cap that a picture of the scene would have, and how much a round of it reads; 0: all of it fits.
 uint64_t pt_pager_cap(const struct patina_device *device, const struct patina_scene *scene, uint64_t *round);
 

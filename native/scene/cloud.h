@@ -72,17 +72,18 @@ struct patina_cloud {
     uint32_t chunk_count;
     uint32_t mapped; // bits 1 << pt_array: of points, pages of a file that nobody ever wrote to
     struct pt_chunk *chunks;
-    struct pt_paged *paged; // of a cloud whose points arrive page by page (paged.h), else NULL
-    float *positions;       // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
-    uint32_t *order;        // slots: index in the caller's arrays
-    uint32_t *surfels;      // slots: octahedral normal and spacing class (shared/words.h)
-    int beside;             // pt_shapes_beside; files keep it
-    uint32_t *shapes;       // slots: footprint, thickness, kind (shared/words.h), or NULL where the cloud was not analysed
-    void *colors;           // slots x 3 uint8 (sRGB) or float (linear), or NULL
-    uint8_t *opacities;     // slots, or NULL where every point is opaque
-    float *radii;           // slots, object units, or NULL
-    float *scalars;         // slots, or NULL
-    uint8_t *classes;       // slots, or NULL
+    struct pt_page_sums *page_sums; // what its arrays in the file sum up to (page_sums.h); NULL: nobody wrote it
+    struct pt_paged *paged;         // of a cloud whose points arrive page by page (paged.h), else NULL
+    float *positions;               // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
+    uint32_t *order;                // slots: index in the caller's arrays
+    uint32_t *surfels;              // slots: octahedral normal and spacing class (shared/words.h)
+    int beside;                     // pt_shapes_beside; files keep it
+    uint32_t *shapes;   // slots: footprint, thickness, kind (shared/words.h), or NULL where the cloud was not analysed
+    void *colors;       // slots x 3 uint8 (sRGB) or float (linear), or NULL
+    uint8_t *opacities; // slots, or NULL where every point is opaque
+    float *radii;       // slots, object units, or NULL
+    float *scalars;     // slots, or NULL
+    uint8_t *classes;   // slots, or NULL
     uint64_t class_hash;
     enum pt_color_format color_format;
     uint32_t threads;        // at most, as the caller said; 0: not said
@@ -144,8 +145,8 @@ void pt_cloud_return(const struct patina_cloud *cloud);
 void pt_cloud_expect(const struct patina_cloud *cloud, uint32_t arrays, uint64_t first, uint64_t end);
 
 // cloud_store.c: a file of a cloud that need not be in memory at once. begin: of `cloud` the numbers that sizes follow from count, not its
-// arrays; `path` lasts. Then each array in its order, in any pieces, side by side; what fails is told at the end. end: of `cloud` the
-// chunks too. The file takes its place if all went well.
+// arrays; it and `path` last. Then each array in its order, in any pieces, side by side, once the chunks that these points are of stand in
+// `cloud`; what fails is told at the end. end: the same cloud. The file takes its place if all went well.
 struct pt_cloud_writer;
 int pt_cloud_writer_begin(const char *path, const struct patina_cloud *cloud, struct pt_cloud_writer **out);
 void pt_cloud_writer_add(struct pt_cloud_writer *writer, enum pt_array array, const void *data, uint64_t size);

@@ -3,6 +3,7 @@
 #include "cloud.h"
 #include "base/descriptor.h"
 #include "base/platform.h"
+#include "page_sums.h"
 #include "paged.h"
 
 #include <stdlib.h>
@@ -39,6 +40,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
         pt_pages_free(*sections[i].data, sections[i].size);
     pt_sights_free(&cloud->sights);
     pt_paged_destroy(cloud);
+    pt_page_sums_destroy(cloud->page_sums);
     free(cloud->chunks);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
     pt_alive_release(cloud->alive);

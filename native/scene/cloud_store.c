@@ -5,6 +5,7 @@
 #include "analysis.h"
 #include "cloud.h"
 #include "fingerprint.h"
+#include "page_sums.h"
 #include "paged.h"
 #include "base/platform.h"
 #include "base/progress.h"
@@ -15,7 +16,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SECTION = 1 << 16, VERSION = 10, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
+// Files of the version before have no sums of pages.
+enum { SECTION = 1 << 16, VERSION = 11, WITHOUT_PAGES = 10, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
 static const char magic[8] = {'p', 'a', 't', 'i', 'n', 'a', '\n', '\x1a'};
 
 struct header {
@@ -28,13 +30,15 @@ struct header {
     uint64_t beside;                               // the cloud's
     patina_cloud_info info;
     uint64_t sums[SECTIONS]; // of what each section holds, see sum_of
-    uint64_t check;          // of all before it, and of the chunks
+    uint64_t check;          // of all before it, the chunks, and page_sum
+    uint64_t page_sum;       // of the sums of pages, which lie behind the last section
 };
 
 static uint64_t check_of(const struct header *header, const struct pt_chunk *chunks)
 {
-    uint64_t hash = pt_fingerprint(VERSION, header, offsetof(struct header, check));
-    return pt_fingerprint(hash, chunks, header->chunk_count * sizeof *chunks);
+    uint64_t hash = pt_fingerprint(header->version, header, offsetof(struct header, check));
+    hash = pt_fingerprint(hash, chunks, header->chunk_count * sizeof *chunks);
+    return header->version == WITHOUT_PAGES ? hash : pt_fingerprint(hash, &header->page_sum, sizeof header->page_sum);
 }
 
 // Piece by piece, so that a file need not be in memory whole to be compared.
@@ -42,12 +46,18 @@ static uint64_t add_piece(uint64_t sum, const void *data, size_t size) { return 
 
 static uint64_t round_section(uint64_t size) { return (size + SECTION - 1) / SECTION * SECTION; }
 
-static uint64_t file_size(const struct pt_section sections[SECTIONS])
+// Where the sums of pages lie: behind the header and all sections.
+static uint64_t pages_at(const struct pt_section sections[SECTIONS])
 {
-    uint64_t size = SECTION; // the header
+    uint64_t size = SECTION;
     for (int i = 0; i < SECTIONS; i++)
         size += round_section(sections[i].size);
     return size;
+}
+
+static uint64_t file_size(const struct pt_section sections[SECTIONS], uint32_t version, uint32_t chunks)
+{
+    return pages_at(sections) + (version == WITHOUT_PAGES ? 0 : round_section(pt_page_sum_bytes(chunks)));
 }
 
 static int fail_with(const char *path, const char *what, int error)
@@ -66,6 +76,9 @@ struct pt_cloud_writer {
     uint64_t at[SECTIONS], left[SECTIONS]; // where the next piece goes; what is to come
     char *piece[SECTIONS];                 // that fills
     size_t held[SECTIONS];
+    const struct patina_cloud *cloud;
+    struct pt_page_summing pages;
+    uint64_t pages_at;
     int good;
 };
 
@@ -94,10 +107,13 @@ int pt_cloud_writer_begin(const char *path, const struct patina_cloud *cloud, st
     }
     writer->good = 1;
     writer->path = path;
-    writer->header.size = file_size(sections);
-    const int error = pt_whole_begin(path, &writer->whole);
+    writer->cloud = cloud;
+    writer->pages_at = at;
+    writer->header.size = file_size(sections, VERSION, cloud->chunk_count);
+    int error = pt_page_summing_begin(&writer->pages, cloud->chunk_count) ? ENOMEM : pt_whole_begin(path, &writer->whole);
     if (!error)
         return PATINA_OK;
+    pt_page_summing_end(&writer->pages);
     free(writer);
     *out = NULL;
     return fail_with(path, "written", error);
@@ -108,6 +124,8 @@ void pt_cloud_writer_add(struct pt_cloud_writer *writer, enum pt_array section, 
     const char *from = data;
     size_t *held = &writer->held[section];
     writer->good &= size <= writer->left[section];
+    if (writer->good)
+        pt_page_summing_add(&writer->pages, writer->cloud, section, data, size);
     for (uint64_t done = 0; done < size && writer->good;) {
         const uint64_t some = size - done < PIECE - *held ? size - done : PIECE - *held;
         const int last = writer->left[section] == some;
@@ -144,8 +162,22 @@ static void fill_header(struct header *header, const struct patina_cloud *cloud)
     header->sight_count = cloud->sights.count;
     header->sight_room = cloud->sights.room;
     header->sight_bytes = cloud->sights.bytes;
+    struct patina_cloud copy = *cloud;
+    struct pt_section sections[SECTIONS];
     header->info = cloud->info;
+    header->info.bytes = 0; // of the arrays, wherever they lie just now
+    pt_cloud_sections(&copy, sections);
+    for (int i = 0; i < SECTIONS; i++)
+        header->info.bytes += sections[i].size;
     header->check = check_of(header, cloud->chunks);
+}
+
+static int write_pages(struct pt_cloud_writer *writer)
+{
+    const size_t size = pt_page_sum_bytes(writer->cloud->chunk_count);
+    writer->header.page_sum = add_piece(VERSION, writer->pages.sums, size);
+    return !size || (!pt_stream_seek(writer->whole.stream, writer->pages_at) &&
+                     fwrite(writer->pages.sums, size, 1, writer->whole.stream) == 1);
 }
 
 int pt_cloud_writer_end(struct pt_cloud_writer *writer, const struct patina_cloud *cloud)
@@ -155,12 +187,14 @@ int pt_cloud_writer_end(struct pt_cloud_writer *writer, const struct patina_clou
         good &= !writer->left[i];
         free(writer->piece[i]);
     }
+    good = good && write_pages(writer);
     fill_header(&writer->header, cloud);
     good = good && !pt_stream_seek(writer->whole.stream, 0) &&
            fwrite(&writer->header, sizeof writer->header, 1, writer->whole.stream) == 1 &&
            !pt_stream_resize(writer->whole.stream, writer->header.size);
     const int error = pt_whole_end(&writer->whole, good);
     const int code = error ? fail_with(writer->path, "written", error) : PATINA_OK;
+    pt_page_summing_end(&writer->pages);
     free(writer);
     return code;
 }
@@ -170,6 +204,7 @@ void pt_cloud_writer_drop(struct pt_cloud_writer *writer)
     for (int i = 0; i < SECTIONS; i++)
         free(writer->piece[i]);
     pt_whole_end(&writer->whole, 0);
+    pt_page_summing_end(&writer->pages);
     free(writer);
 }
 
@@ -229,7 +264,7 @@ static int check_header(const char *path, const struct header *header, uint64_t 
 {
     if (memcmp(header->magic, magic, sizeof magic))
         return refuse(path, "not a saved cloud");
-    if (header->version != VERSION || header->chunk_size != sizeof(struct pt_chunk) ||
+    if ((header->version != VERSION && header->version != WITHOUT_PAGES) || header->chunk_size != sizeof(struct pt_chunk) ||
         header->info.struct_size != sizeof header->info)
         return refuse(path, "a saved cloud of another version");
     if (header->size != size)
@@ -278,7 +313,27 @@ static int read_header(const char *path, const struct pt_disk *disk, struct pati
     cloud->sights = (struct pt_sights){
         .count = (uint32_t)header->sight_count, .room = (uint32_t)header->sight_room, .bytes = header->sight_bytes};
     pt_cloud_sections(cloud, sections);
-    return file_size(sections) == header->size ? PATINA_OK : refuse(path, "its header is damaged");
+    return file_size(sections, header->version, header->chunk_count) == header->size ? PATINA_OK
+                                                                                     : refuse(path, "its header is damaged");
+}
+
+// The sums of pages: what they say is believed if they are those that were written, as the header knows.
+static int read_pages(const char *path, const struct pt_disk *disk, const struct header *header, uint64_t at,
+                      struct patina_cloud *cloud)
+{
+    const size_t size = pt_page_sum_bytes(cloud->chunk_count);
+    size_t got;
+    if (header->version == WITHOUT_PAGES || !size)
+        return PATINA_OK;
+    uint32_t *sums = malloc(size);
+    if (!sums)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    if (pt_disk_read(disk, at, sums, size, &got) || got != size || add_piece(VERSION, sums, size) != header->page_sum) {
+        free(sums);
+        return refuse(path, "the check sums of its pages are damaged");
+    }
+    cloud->page_sums = pt_page_sums_create(cloud, sums, path);
+    return cloud->page_sums ? PATINA_OK : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
 }
 
 static int open_disk(const char *path, const struct pt_disk *disk, struct patina_cloud *cloud)
@@ -304,16 +359,17 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
     for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
         cloud->mapped |= (uint32_t)(sections[i].size > 0) << i;
     cloud->beside = header.beside != 0;
-    return check_cloud(path, cloud);
+    code = check_cloud(path, cloud);
+    return code ? code : read_pages(path, disk, &header, pages_at(sections), cloud);
 }
 
 // ---- verify ------------------------------------------------------------------------------------------------------------
 
 // Whether a section of the file, from byte `at` on, still has the sum that it was written with.
-static int verify_section(const char *path, const struct pt_disk *disk, uint64_t at, uint64_t size, uint64_t wanted,
-                          char *buffer, patina_progress *progress)
+static int verify_section(const char *path, const struct pt_disk *disk, const struct header *header, uint64_t at, uint64_t size,
+                          uint64_t wanted, char *buffer, patina_progress *progress)
 {
-    uint64_t sum = VERSION;
+    uint64_t sum = header->version;
     for (uint64_t done = 0; done < size;) {
         const size_t piece = size - done < PIECE ? size - done : PIECE;
         size_t got;
@@ -338,7 +394,7 @@ static int verify_disk(const char *path, const struct pt_disk *disk, char *buffe
     int code = read_header(path, disk, &cloud, &header, sections);
     uint64_t at = SECTION;
     for (int i = 0; i < SECTIONS && !code; i++) {
-        code = verify_section(path, disk, at, sections[i].size, header.sums[i], buffer, progress);
+        code = verify_section(path, disk, &header, at, sections[i].size, header.sums[i], buffer, progress);
         at += round_section(sections[i].size);
         pt_progress_set(progress, (double)at / (double)header.size);
     }

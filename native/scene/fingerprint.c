@@ -50,6 +50,36 @@ uint64_t pt_fingerprint(uint64_t seed, const void *data, size_t size)
     return end(ways, seed, take(ways, data, size), data, size);
 }
 
+void pt_sum_begin(struct pt_sum *sum, uint64_t seed)
+{
+    *sum = (struct pt_sum){.seed = seed};
+    begin(sum->ways, seed);
+}
+
+void pt_sum_add(struct pt_sum *sum, const void *data, size_t size)
+{
+    const char *from = data;
+    const size_t waits = sum->size % sizeof sum->rest;
+    sum->size += size;
+    if (waits) {
+        const size_t some = sizeof sum->rest - waits < size ? sizeof sum->rest - waits : size;
+        memcpy(sum->rest + waits, from, some);
+        if (waits + some < sizeof sum->rest)
+            return;
+        take(sum->ways, (const char *)sum->rest, sizeof sum->rest);
+        from += some;
+        size -= some;
+    }
+    const size_t left_over = take(sum->ways, from, size);
+    memcpy(sum->rest, from + size - left_over, left_over);
+}
+
+uint64_t pt_sum_end(const struct pt_sum *sum)
+{
+    const size_t left_over = sum->size % sizeof sum->rest;
+    return end(sum->ways, sum->seed, left_over, (const char *)sum->rest, left_over);
+}
+
 // The same of an array of the cloud, of which no more than a piece is held where it lies in a file.
 static uint64_t fingerprint_array(uint64_t seed, const struct patina_cloud *cloud, const void *data, size_t size)
 {

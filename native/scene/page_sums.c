@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "page_sums.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static uint32_t fold(uint64_t sum) { return (uint32_t)(sum ^ sum >> 32); }
+
+static uint64_t seed_of(uint32_t chunk, enum pt_array array) { return (uint64_t)chunk << 8 | (uint64_t)array; }
+
+// Bytes of a point of an array that the cloud has, in a file or not.
+static uint32_t point_bytes(const struct patina_cloud *cloud, enum pt_array array)
+{
+    static const uint8_t bytes[PT_ARRAYS] = {
+        [PT_ARRAY_POSITIONS] = 12, [PT_ARRAY_ORDER] = 4,   [PT_ARRAY_SURFELS] = 4, [PT_ARRAY_OPACITIES] = 1,
+        [PT_ARRAY_RADII] = 4,      [PT_ARRAY_SCALARS] = 4, [PT_ARRAY_CLASSES] = 1, [PT_ARRAY_SHAPES] = 4};
+    return array == PT_ARRAY_COLORS ? (uint32_t)pt_color_size(cloud->color_format) : bytes[array];
+}
+
+// ---- written -----------------------------------------------------------------------------------------------------------
+
+int pt_page_summing_begin(struct pt_page_summing *summing, uint32_t chunks)
+{
+    *summing = (struct pt_page_summing){.sums = calloc(1, pt_page_sum_bytes(chunks) + 1)};
+    return summing->sums ? PATINA_OK : PATINA_ERROR_MEMORY;
+}
+
+void pt_page_summing_add(struct pt_page_summing *summing, const struct patina_cloud *cloud, enum pt_array array,
+                         const void *data, size_t size)
+{
+    if (array < PT_ARRAY_POSITIONS || array > PT_ARRAY_SHAPES)
+        return;
+    for (const char *from = data; size && summing->chunk[array] < cloud->chunk_count;) {
+        const uint32_t c = summing->chunk[array];
+        uint64_t *left = &summing->left[array];
+        if (!*left) {
+            *left = (uint64_t)cloud->chunks[c].padded * point_bytes(cloud, array);
+            pt_sum_begin(&summing->sum[array], seed_of(c, array));
+        }
+        const size_t some = size < *left ? size : (size_t)*left;
+        pt_sum_add(&summing->sum[array], from, some);
+        from += some;
+        size -= some;
+        *left -= some;
+        if (!*left) {
+            summing->sums[(size_t)c * PT_SUMMED + (size_t)array - 1] = fold(pt_sum_end(&summing->sum[array]));
+            summing->chunk[array]++;
+        }
+    }
+}
+
+void pt_page_summing_end(struct pt_page_summing *summing)
+{
+    free(summing->sums);
+    summing->sums = NULL;
+}
+
+// ---- read --------------------------------------------------------------------------------------------------------------
+
+struct pt_page_sums *pt_page_sums_create(const struct patina_cloud *cloud, uint32_t *sums, const char *path)
+{
+    struct pt_page_sums *pages = calloc(1, sizeof *pages);
+    const size_t length = strlen(path) + 1;
+    if (pages) {
+        *pages = (struct pt_page_sums){.sums = sums,
+                                       .states = calloc((size_t)cloud->chunk_count + 1, sizeof *pages->states),
+                                       .chunk_count = cloud->chunk_count,
+                                       .path = malloc(length)};
+        if (pages->states && pages->path) {
+            memcpy(pages->path, path, length);
+            return pages;
+        }
+    } else {
+        free(sums);
+    }
+    pt_page_sums_destroy(pages);
+    return NULL;
+}
+
+void pt_page_sums_destroy(struct pt_page_sums *pages)
+{
+    if (!pages)
+        return;
+    free(pages->sums);
+    free(pages->states);
+    free(pages->path);
+    free(pages);
+}
+
+int pt_page_is_damaged(const struct patina_cloud *cloud, uint32_t chunk)
+{
+    return cloud->page_sums && atomic_load_explicit(&cloud->page_sums->states[chunk], memory_order_relaxed) & PT_PAGE_DAMAGED;
+}
+
+uint32_t pt_page_unseen(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays)
+{
+    const uint32_t summed = (2u << PT_ARRAY_SHAPES) - (1u << PT_ARRAY_POSITIONS);
+    if (!cloud->page_sums)
+        return 0;
+    const uint32_t state = atomic_load_explicit(&cloud->page_sums->states[chunk], memory_order_relaxed);
+    return state & PT_PAGE_DAMAGED ? 0 : arrays & cloud->mapped & summed & ~state;
+}
+
+static int is_good(const struct patina_cloud *cloud, uint32_t c, enum pt_array array)
+{
+    struct patina_cloud copy = *cloud;
+    struct pt_section sections[PT_ARRAYS];
+    const struct pt_chunk *chunk = &cloud->chunks[c];
+    const uint64_t each = point_bytes(cloud, array);
+    pt_cloud_sections(&copy, sections);
+    const char *data = (const char *)*sections[array].data + chunk->first * each;
+    const uint64_t sum = pt_fingerprint(seed_of(c, array), data, (size_t)(chunk->padded * each));
+    return fold(sum) == cloud->page_sums->sums[(size_t)c * PT_SUMMED + (size_t)array - 1];
+}
+
+int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays)
+{
+    const uint32_t unseen = pt_page_unseen(cloud, chunk, arrays);
+    uint32_t good = 0, bad = 0;
+    for (int i = PT_ARRAY_POSITIONS; i <= PT_ARRAY_SHAPES && !bad; i++)
+        if (unseen >> i & 1u) {
+            if (is_good(cloud, chunk, (enum pt_array)i))
+                good |= 1u << i;
+            else
+                bad = PT_PAGE_DAMAGED;
+        }
+    if (!(good | bad))
+        return 0;
+    const uint32_t before = atomic_fetch_or(&cloud->page_sums->states[chunk], good | bad);
+    return bad && !(before & PT_PAGE_DAMAGED);
+}
+
+void pt_page_tell(const struct patina_cloud *cloud, uint32_t chunk, uint32_t pages, uint64_t points)
+{
+    const struct pt_chunk *at = &cloud->chunks[chunk];
+    double middle[3];
+    for (int k = 0; k < 3; k++)
+        middle[k] = at->origin[k] + 0.5 * ((double)at->box_min[k] + (double)at->box_max[k]);
+    if (pages == 1)
+        pt_log(PT_LOG_WARNING, "%s: page %u of %u is damaged, and its %llu points about (%.10g, %.10g, %.10g) are left out",
+               cloud->page_sums->path, chunk + 1, cloud->chunk_count, (unsigned long long)points, middle[0], middle[1],
+               middle[2]);
+    else
+        pt_log(PT_LOG_WARNING,
+               "%s: %u of %u pages are damaged, and their %llu points are left out; the first is page %u, about (%.10g, %.10g, "
+               "%.10g)",
+               cloud->page_sums->path, pages, cloud->chunk_count, (unsigned long long)points, chunk + 1, middle[0], middle[1],
+               middle[2]);
+}

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A page is a chunk: what each of its arrays in the file must sum up to, so that a picture finds damage where it reads (SPEC 13).
+#ifndef PT_PAGE_SUMS_H
+#define PT_PAGE_SUMS_H
+
+#include "cloud.h"
+#include "fingerprint.h"
+
+// Of the arrays that lie point by point: from positions to shapes.
+enum { PT_SUMMED = PT_ARRAY_SHAPES };
+
+// As they lie in a file: of chunk c and array a the sum [c * PT_SUMMED + a - 1]; 0 where there is no such array.
+static inline size_t pt_page_sum_bytes(uint64_t chunks) { return (size_t)chunks * PT_SUMMED * sizeof(uint32_t); }
+
+struct pt_page_sums {
+    uint32_t *sums;
+    atomic_uint *states; // a chunk: bits 1 << array: is as it was written; PT_PAGE_DAMAGED: is not, and is left out
+    uint32_t chunk_count, arrays;
+    char *path; // of the file
+};
+enum { PT_PAGE_DAMAGED = 1 };
+
+// Makes those of a file that is written: arrays come in pieces, each from chunk to chunk.
+struct pt_page_summing {
+    uint32_t *sums;
+    struct pt_sum sum[PT_ARRAYS]; // of the chunk at hand
+    uint32_t chunk[PT_ARRAYS];
+    uint64_t left[PT_ARRAYS]; // bytes that the chunk has yet
+};
+int pt_page_summing_begin(struct pt_page_summing *summing, uint32_t chunks);
+void pt_page_summing_add(struct pt_page_summing *summing, const struct patina_cloud *cloud, enum pt_array array,
+                         const void *data, size_t size);
+void pt_page_summing_end(struct pt_page_summing *summing);
+
+// Takes over `sums`. NULL without memory.
+struct pt_page_sums *pt_page_sums_create(const struct patina_cloud *cloud, uint32_t *sums, const char *path);
+void pt_page_sums_destroy(struct pt_page_sums *pages); // NULL is fine
+
+// Whether a chunk was found to be damaged.
+int pt_page_is_damaged(const struct patina_cloud *cloud, uint32_t chunk);
+// Whether these arrays (bits 1 << pt_array) of the chunk need a look yet: those that lie in the file. Any thread.
+uint32_t pt_page_unseen(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays);
+// Looks at them. 1: it is damaged, and nobody had found it before. Any thread.
+int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays);
+// One line of the log on so many pages that were found, the first of them `chunk`.
+void pt_page_tell(const struct patina_cloud *cloud, uint32_t chunk, uint32_t pages, uint64_t points);
+
+#endif

@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Damaged pages of a cloud's file: the picture is that of all other points, one line names them, and nothing else changes. Files of the
+// version before, which have no sums of pages, still open.
+#include "clouds.h"
+#include "support.h"
+
+#include "scene/cloud.h"
+#include "scene/fingerprint.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { POINTS = 120000, WIDTH = 200, HEIGHT = 160, SECTION = 1 << 16 };
+enum { VERSION_AT = 8, SIZE_AT = 32, BYTES_OF_CHUNKS_AT = 12, CHUNKS_AT = 20, SUM_AT = 504 }; // in the head
+
+static char good[80], bad[80];
+
+static unsigned char *bytes_of(const char *path, size_t *size)
+{
+    FILE *stream = fopen(path, "rb");
+    assert_non_null(stream);
+    fseek(stream, 0, SEEK_END);
+    *size = (size_t)ftell(stream);
+    rewind(stream);
+    unsigned char *data = malloc(*size + 1);
+    assert_int_equal(fread(data, 1, *size, stream), *size);
+    fclose(stream);
+    return data;
+}
+
+static void write_bytes(const char *path, const void *data, size_t size)
+{
+    FILE *stream = fopen(path, "wb");
+    assert_non_null(stream);
+    assert_int_equal(fwrite(data, 1, size, stream), size);
+    fclose(stream);
+}
+
+static uint32_t word_at(const unsigned char *data, size_t at)
+{
+    uint32_t word;
+    memcpy(&word, data + at, sizeof word);
+    return word;
+}
+
+static size_t rounded(size_t size) { return (size + SECTION - 1) / SECTION * SECTION; }
+
+// Where the positions begin.
+static size_t positions_at(const unsigned char *data)
+{
+    return SECTION + rounded((size_t)word_at(data, CHUNKS_AT) * word_at(data, BYTES_OF_CHUNKS_AT));
+}
+
+static patina_cloud *open_cloud(const char *path)
+{
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_open(path, &cloud), NULL);
+    return cloud;
+}
+
+static const patina_camera *camera_of(void)
+{
+    static patina_camera camera;
+    const double eye[3] = {4, -3, 3}, target[3] = {0, 0, 0};
+    camera = camera_perspective(eye, target, 45, WIDTH, HEIGHT, 0.1, 100);
+    return &camera;
+}
+
+static struct picture render_with(patina_device *device, const patina_cloud *cloud, const patina_settings *settings)
+{
+    patina_scene *scene = scene_of(cloud, NULL);
+    struct picture picture = picture_render(device, scene, camera_of(), settings);
+    patina_scene_destroy(scene);
+    return picture;
+}
+
+// All that the log holds; how many lines.
+static int drain(char *text, size_t size)
+{
+    char line[512];
+    int level, lines = 0;
+    text[0] = 0;
+    while (patina_log_next(line, sizeof line, &level)) {
+        snprintf(text + strlen(text), size - strlen(text), "%s\n", line);
+        lines++;
+    }
+    return lines;
+}
+
+static int make_files(void **state)
+{
+    (void)state;
+    snprintf(good, sizeof good, "patina-pages-%ld.good.cloud", (long)getpid());
+    snprintf(bad, sizeof bad, "patina-pages-%ld.bad.cloud", (long)getpid());
+    struct points points = points_torus(POINTS, 2.0, 0.7, POINTS_ALL, 7);
+    const patina_cloud_desc desc = points_desc(&points);
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
+    CHECK(patina_cloud_save(cloud, good), cloud);
+    patina_cloud_destroy(cloud);
+    points_free(&points);
+    return 0;
+}
+
+static int remove_files(void **state)
+{
+    (void)state;
+    remove(good);
+    remove(bad);
+    return 0;
+}
+
+// Chunks of which a bit of an array is another one; `each`: bytes of a point, at `at`.
+static void damage(const uint32_t *chunks, uint32_t count, size_t at, size_t each)
+{
+    size_t size;
+    unsigned char *data = bytes_of(good, &size);
+    patina_cloud *cloud = open_cloud(good);
+    for (uint32_t i = 0; i < count; i++)
+        data[at + cloud->chunks[chunks[i]].first * each + 100 * each / 2] ^= 4;
+    patina_cloud_destroy(cloud);
+    write_bytes(bad, data, size);
+    free(data);
+}
+
+static int is_of(const patina_cloud *cloud, const uint32_t *chunks, uint32_t count, uint64_t number)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const struct pt_chunk *chunk = &cloud->chunks[chunks[i]];
+        for (uint32_t k = 0; k < chunk->count; k++)
+            if (cloud->order[chunk->first + k] == number)
+                return 1;
+    }
+    return 0;
+}
+
+// Pixels that showed other points show them still; those of the damaged pages show what lies behind, or nothing.
+static void expect_without(const patina_cloud *whole, const struct picture *before, const struct picture *after,
+                           const uint32_t *chunks, uint32_t count)
+{
+    uint32_t lost = 0;
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+        if (before->keys[i] != KEY_EMPTY && is_of(whole, chunks, count, key_id(before->keys[i]))) {
+            lost++;
+            assert_true(after->keys[i] > before->keys[i]);
+        } else {
+            assert_true(after->keys[i] == before->keys[i]);
+        }
+        assert_true(after->keys[i] == KEY_EMPTY || !is_of(whole, chunks, count, key_id(after->keys[i])));
+    }
+    print_message("%u pixels showed a damaged page\n", lost);
+    assert_true(lost > 20);
+}
+
+static patina_settings plain(void)
+{
+    patina_settings settings = settings_default(WIDTH, HEIGHT);
+    settings.fill = PATINA_FILL_OFF;
+    return settings;
+}
+
+// One page, some pages: of positions, and of what belongs to them.
+static void left_out(patina_device *device, const char *name)
+{
+    print_message("%s\n", name);
+    patina_cloud *whole = open_cloud(good);
+    const uint32_t some[] = {whole->chunk_count / 2, whole->chunk_count / 3, whole->chunk_count - 1, 0, whole->chunk_count / 5};
+    size_t size, at;
+    char log[2048], wanted[128];
+    unsigned char *data = bytes_of(good, &size);
+    const patina_settings settings = plain();
+    struct picture before = render_with(device, whole, &settings);
+    drain(log, sizeof log);
+    for (int round = 0; round < 3; round++) {
+        const uint32_t count = round == 1 ? 5 : 1;
+        at = positions_at(data);
+        if (round == 2) // surfels: behind positions and numbers
+            at += rounded((size_t)whole->slots * 12) + rounded((size_t)whole->slots * 4);
+        damage(some, count, at, round == 2 ? 4 : 12);
+        patina_cloud *damaged = open_cloud(bad);
+        assert_int_equal(drain(log, sizeof log), 0); // nobody has read it
+        struct picture after = render_with(device, damaged, &settings);
+        assert_int_equal(drain(log, sizeof log), 1);
+        snprintf(wanted, sizeof wanted, count > 1 ? "%s: 5 of %u pages are damaged" : "%s: page %u of", bad,
+                 count > 1 ? whole->chunk_count : some[0] + 1);
+        if (!strstr(log, wanted) || !strstr(log, "left out"))
+            support_die("'%s' should hold '%s'", log, wanted);
+        expect_without(whole, &before, &after, some, count);
+        struct picture again = render_with(device, damaged, &settings); // and tells it once
+        if (drain(log, sizeof log))
+            support_die("told again: %s", log);
+        assert_memory_equal(again.keys, after.keys, WIDTH * HEIGHT * sizeof *after.keys);
+        patina_cloud_destroy(damaged);
+        picture_free(&after);
+        picture_free(&again);
+        assert_int_equal(patina_cloud_verify(bad, NULL), PATINA_ERROR_FORMAT);
+        drain(log, sizeof log);
+    }
+    free(data);
+    picture_free(&before);
+    patina_cloud_destroy(whole);
+}
+
+static void test_left_out(void **state)
+{
+    (void)state;
+    support_each_device(left_out);
+}
+
+// Below a cap, in rounds; light maps, and filled layers: nothing crashes, and the picture does not depend on the cap.
+static void test_rounds(void **state)
+{
+    (void)state;
+    patina_cloud *whole = open_cloud(good);
+    const uint32_t some[] = {whole->chunk_count / 2, whole->chunk_count / 3};
+    size_t size;
+    char log[2048];
+    unsigned char *data = bytes_of(good, &size);
+    damage(some, 2, positions_at(data), 12);
+    free(data);
+    const patina_settings settings = settings_default(WIDTH, HEIGHT);
+    struct picture pictures[2];
+    for (int capped = 0; capped < 2; capped++) {
+        const patina_device_desc desc = {.struct_size = sizeof desc, .name = "cpu", .mapped_cap = capped ? 400000 : 0};
+        patina_device *device = NULL;
+        CHECK(patina_device_create(&desc, &device), NULL);
+        patina_cloud *damaged = open_cloud(bad);
+        pictures[capped] = render_with(device, damaged, &settings);
+        const int lines = drain(log, sizeof log);
+        assert_true(lines == 1 || (capped && lines == 2));
+        patina_cloud_destroy(damaged);
+        patina_device_destroy(device);
+    }
+    assert_memory_equal(pictures[0].keys, pictures[1].keys, WIDTH * HEIGHT * sizeof *pictures[0].keys);
+    assert_memory_equal(pictures[0].combined, pictures[1].combined, WIDTH * HEIGHT * 4 * sizeof *pictures[0].combined);
+    picture_free(&pictures[0]);
+    picture_free(&pictures[1]);
+    patina_cloud_destroy(whole);
+}
+
+// The sums themselves, or where they should be.
+static void test_damaged_sums(void **state)
+{
+    (void)state;
+    size_t size;
+    patina_cloud *cloud = NULL;
+    unsigned char *data = bytes_of(good, &size);
+    data[size - SECTION] ^= 1; // they lie in the last section
+    write_bytes(bad, data, size);
+    assert_int_equal(patina_cloud_open(bad, &cloud), PATINA_ERROR_FORMAT);
+    assert_null(cloud);
+    assert_non_null(strstr(support_message(NULL), "check sums"));
+    write_bytes(bad, data, size - SECTION);
+    assert_int_equal(patina_cloud_open(bad, &cloud), PATINA_ERROR_FORMAT);
+    assert_non_null(strstr(support_message(NULL), "cut short"));
+    free(data);
+}
+
+// As the version before wrote it: no sums, another number, and a sum of the head that counts on that.
+static void test_version_before(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *data = bytes_of(good, &size);
+    const uint32_t version = 10;
+    const uint64_t less = size - SECTION;
+    memcpy(data + VERSION_AT, &version, sizeof version);
+    memcpy(data + SIZE_AT, &less, sizeof less);
+    uint64_t sum = pt_fingerprint(version, data, SUM_AT);
+    sum = pt_fingerprint(sum, data + SECTION, (size_t)word_at(data, CHUNKS_AT) * word_at(data, BYTES_OF_CHUNKS_AT));
+    memcpy(data + SUM_AT, &sum, sizeof sum);
+    memset(data + SUM_AT + 8, 0, 8);
+    write_bytes(bad, data, (size_t)less);
+    free(data);
+    patina_device *device = support_device_first();
+    const patina_settings settings = plain();
+    patina_cloud *whole = open_cloud(good), *old = open_cloud(bad);
+    struct picture before = render_with(device, whole, &settings), after = render_with(device, old, &settings);
+    assert_memory_equal(before.keys, after.keys, WIDTH * HEIGHT * sizeof *before.keys);
+    picture_free(&before);
+    picture_free(&after);
+    patina_cloud_destroy(whole);
+    patina_cloud_destroy(old);
+    patina_device_destroy(device);
+}
+
+// In whatever pieces, it is the sum of all.
+static void test_sum(void **state)
+{
+    (void)state;
+    unsigned char data[300];
+    for (size_t i = 0; i < sizeof data; i++)
+        data[i] = (unsigned char)(i * i + 7 * i);
+    for (size_t size = 0; size <= sizeof data; size++)
+        for (size_t piece = 1; piece < 90; piece += 11) {
+            struct pt_sum sum;
+            pt_sum_begin(&sum, size);
+            for (size_t done = 0; done < size; done += piece)
+                pt_sum_add(&sum, data + done, size - done < piece ? size - done : piece);
+            assert_true(pt_sum_end(&sum) == pt_fingerprint(size, data, size));
+        }
+}
+
+int main(int argc, char **argv)
+{
+    support_arguments(argc, argv);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sum), cmocka_unit_test(test_left_out),
+                                       cmocka_unit_test(test_rounds), cmocka_unit_test(test_damaged_sums),
+                                       cmocka_unit_test(test_version_before)};
+    return cmocka_run_group_tests(tests, make_files, remove_files);
+}
