@@ -49,11 +49,11 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> Steps[PointFile]:
     return (yield from reader(path).steps(path, wanted, progress))
 
 
-def in_pieces(path: Path, least: int, names: Collection[str]) -> Pieces | None:
+def in_pieces(path: Path, least: int, names: Collection[str], progress: Progress) -> Steps[Pieces | None]:
     """The points of a file of more than least, with those scalars that are named; None where there are not so many, or where the
     format is read whole. PatinaError when it cannot be read."""
     pieces = getattr(reader(path), "in_pieces", None)
-    return pieces(path, least, names) if pieces else None
+    return (yield from pieces(path, least, names, progress)) if pieces else None
 
 
 def preview(path: Path) -> list[str]:

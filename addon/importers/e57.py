@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from .. import jobs, native, readers
 from . import scans
 from .crs import units
-from .reading import Filter, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
+from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
 
 MISSING = ("E57 files need the Python package pye57: Install Readers in the add-on's preferences fetches it (Patina's extension for "
            "Blender 4.2 and later brings it)")
@@ -202,14 +202,17 @@ def _fields(header: Any) -> dict[str, str]:
     return {name.rpartition(":")[2]: name for name in header.point_fields if isinstance(prototype[name], numbers)}
 
 
-def _pieces(file: Any, header: Any, pose: Pose) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+def _pieces(file: Any, header: Any, pose: Pose, places: bool = False) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
     """How many points were read, and of the valid ones "positions" in the file's coordinates, "normals" and "rgb" where there
     are such (the latter as the file has them), and all other numbers by name. pye57's own way knows a few fields of certain
-    types; float64 holds what any file declares."""
+    types; float64 holds what any file declares. places: positions alone."""
     from pye57 import libe57
     if not header.point_count:
         return
     fields, size = _fields(header), min(SMALL_PIECE, header.point_count)
+    if places:
+        needed = (_CARTESIAN if all(name in fields for name in _CARTESIAN) else _SPHERICAL) + _INVALID
+        fields = {name: field for name, field in fields.items() if name in needed}
     data = {name: np.empty(size, np.float64) for name in fields}
     buffers = libe57.VectorSourceDestBuffer()
     for name, field in fields.items():
@@ -240,6 +243,21 @@ def _columns(piece: dict[str, np.ndarray], pose: Pose) -> dict[str, np.ndarray]:
         if name not in {*_CARTESIAN, *_SPHERICAL}:
             found.setdefault(_NAMES.get(name, name), values.astype(np.float32))
     return found
+
+
+def _knows_levels(header: Any) -> bool:
+    """Whether a scan's colours have limits before its points are read, as far as it has any."""
+    from pye57 import libe57
+    if not set(_COLORS) <= set(_fields(header)):
+        return True
+    prototype = libe57.StructureNode(header.points.prototype())
+    limits = [[_limit(header, prototype, name, end) for end in ("Minimum", "Maximum")] for name in _COLORS]
+    return bool(np.isfinite(limits).all() and all(high > low for low, high in limits))
+
+
+def in_pieces(path: Path, least: int, names: Collection[str], progress: Progress) -> jobs.Steps[Pieces | None]:
+    from . import e57_pieces
+    return (yield from e57_pieces.steps(path, least, names, progress))
 
 
 def _level_colors(header: Any, parts: list[dict[str, np.ndarray]]) -> None:

@@ -324,12 +324,13 @@ def _fields(piece: np.ndarray, keep: np.ndarray | slice) -> dict[str, np.ndarray
     return found
 
 
-def in_pieces(path: Path, least: int, names: Collection[str]) -> Pieces | None:
+def in_pieces(path: Path, least: int, names: Collection[str], _progress: Progress) -> jobs.Steps[Pieces | None]:
     """The points piece by piece, with those of their scalars that are named; None where there are not more than least."""
     try:
         header = read_header(path)
     except OSError as error:
         raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror}", -3) from None
+    yield from ()
     if header.points <= least:
         return None
     origin = origin_of(header.lower, header.upper, float(header.scale.min()))

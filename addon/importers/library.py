@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from .. import jobs, native
+from ..native.rows import Rows
 from . import scans
-from .reading import Filter, PointFile, Progress, scanners_of
+from .reading import ZERO, Filter, Pieces, PointFile, Progress, scanners_of
+
+SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
@@ -42,6 +46,41 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             notes=scanners_of(stations, file.origin) | scans.note(told),
             warnings=warnings,
             splats=file.splats).filtered(wanted)
+
+
+def in_pieces(path: Path, least: int, names: Collection[str], _progress: Progress) -> jobs.Steps[Pieces | None]:
+    """The points of a binary PLY piece by piece, with those of their scalars that are named; None where there are not more than least, where
+    the library reads the file whole, and of a text, all of which would have to be looked through to know the first thing of it."""
+    yield from ()
+    try:
+        with open(path, "rb") as file:
+            head = file.read(4096)
+    except OSError:
+        return None  # whoever reads it whole says what is wrong
+    if not head.startswith(b"ply") or b"format binary" not in head or path.stat().st_size < least:
+        return None
+    try:
+        with Rows(path) as rows:
+            if rows.whole or rows.count <= least:
+                return None
+            count = rows.count
+            origin = next((window.origin for window in rows.windows(1)), ZERO)
+    except native.PatinaError:
+        return None
+    wanted = frozenset(names)
+    return Pieces(count, origin, (ZERO, ZERO), {}, lambda progress: _each(path, wanted, progress), narrow=False)
+
+
+def _each(path: Path, names: frozenset[str], progress: Progress) -> Iterator[PointFile]:
+    done = 0
+    with Rows(path) as rows:
+        for window in rows.windows(SMALL_PIECE):
+            progress.step(done / rows.count)
+            done += window.count
+            kept = names | {"opacity", "radius"} if window.splats else names
+            scalars = {name: window.attribute(index) for index, name in enumerate(window.attributes) if name in kept}
+            yield PointFile(path.stem, window.positions(), window.normals(), window.colors(), scalars, window.origin,
+                            window.invalid_positions, splats=window.splats)
 
 
 def preview(path: Path) -> list[str]:

@@ -50,14 +50,20 @@ def note(scans: Sequence[Scan]) -> dict[str, str]:
 
 def direction(positions: np.ndarray, station: np.ndarray) -> Direction:
     """Of the rays from a station to (n, 3) places; UNKNOWN where these lie more than 60 degrees about, or it is not known."""
-    ways = positions - station
-    lengths = np.linalg.norm(ways, axis=1)
+    return mean_way(*ways(positions, station))
+
+
+def ways(positions: np.ndarray, station: np.ndarray) -> tuple[np.ndarray, int]:
+    """The sum of unit vectors from a station to those of the places that are somewhere else, and how many these are."""
+    found = positions - station
+    lengths = np.linalg.norm(found, axis=1)
     good = np.isfinite(lengths) & (lengths > 0.0)
-    if not good.any():
-        return UNKNOWN
-    mean = (ways[good] / lengths[good, None]).mean(axis=0)
-    length = float(np.linalg.norm(mean))
-    return tuple(map(float, mean / length)) if length >= ALL_AROUND else UNKNOWN
+    return (found[good] / lengths[good, None]).sum(axis=0), int(good.sum())
+
+
+def mean_way(total: np.ndarray, count: int) -> Direction:
+    length = float(np.linalg.norm(total)) / max(count, 1)
+    return tuple(map(float, total / count / length)) if count and length >= ALL_AROUND else UNKNOWN
 
 
 def interval(positions: np.ndarray, row: np.ndarray, column: np.ndarray) -> float:

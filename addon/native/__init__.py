@@ -420,6 +420,19 @@ class File(_Handle):
 
         return Task("open_file", os.fsencode(path), _handle_of(progress), keep=(progress,), finish=take)
 
+    @classmethod
+    def of_rows(cls, rows: _Handle, most: int) -> File | None:
+        """The next window of a file; None behind its last."""
+        handle = c_void_p()
+        rows._call("next", most, byref(handle))
+        if not handle:
+            return None
+        file = cls.__new__(cls)
+        file._handle = handle
+        file._finalizer = weakref.finalize(file, _destroy, library().patina_file_destroy, handle, None)
+        file._learn()
+        return file
+
     def _learn(self) -> None:
         info = abi.FileInfo()
         self._call("get_info", byref(info))

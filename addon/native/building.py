@@ -16,20 +16,21 @@ Corner = tuple[float, float, float]
 
 class Builder(_Handle):
     """Writes a file that Cloud.open maps. memory: bytes that it takes at most, 0: a third of what is free; count and box of all points,
-    as far as known. Nothing of it is left where it is closed before its end."""
+    as far as known. narrow: what add() says of it. Nothing of it is left where it is closed before its end."""
 
     _kind = "builder"
 
-    def __init__(self, path: Path, memory: int = 0, count: int = 0, box: tuple[Corner, Corner] | None = None, threads: int = 0) -> None:
+    def __init__(self, path: Path, memory: int = 0, count: int = 0, box: tuple[Corner, Corner] | None = None, threads: int = 0,
+                 narrow: bool = True) -> None:
         lower, upper = box or ((0.0,) * 3, (0.0,) * 3)
         self._desc = abi.BuilderDesc(memory=memory, count=count, box_min=(c_double * 3)(*lower), box_max=(c_double * 3)(*upper),
-                                     threads=threads, narrow_colors=1)
+                                     threads=threads, narrow_colors=int(narrow))
         super().__init__(os.fsencode(path), byref(self._desc), create="patina_builder_begin")
 
     def add(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
             opacities: np.ndarray | None = None, radii: np.ndarray | None = None, scalars: np.ndarray | None = None,
             classes: np.ndarray | None = None, origin: Corner = (0.0,) * 3) -> None:
-        """The next points, as Cloud takes them; what the first piece has, all have. Colors of 16 bits that 8 hold become bytes;
+        """The next points, as Cloud takes them; what the first piece has, all have. Narrow: colors of 16 bits that 8 hold become bytes;
         normals, colors, scalars and classes that are zero everywhere are none."""
         self._call("add", byref(_describe(positions, normals, colors, opacities, radii, scalars, classes, 0, origin)))
 

@@ -40,12 +40,14 @@ def steps(pieces: importers.Pieces, place: Path, scalar: str, offset: Corner, hi
     box = tuple(tuple(value - start for value, start in zip(corner, wanted, strict=True)) for corner in pieces.box)
     reading = progress.part(0, parts)
     shown = not hide_uncolored
-    with _Scans(place) as scans, Builder(place, preferences.cloud_bytes(), pieces.count, box) as builder:
+    with _Scans(place) as scans, \
+            Builder(place, preferences.cloud_bytes(), pieces.count, box, narrow=pieces.narrow) as builder:
         for piece in pieces.each(reading):
             if piece is not None:
-                opacities = attributes.without_uncolored(None, piece.colors) if hide_uncolored else None
+                opacity, radius = (column(piece, name) if piece.splats else None for name in ("opacity", "radius"))
+                opacities = attributes.without_uncolored(opacity, piece.colors) if hide_uncolored else opacity
                 shown = shown or bool(opacities is None or opacities.any())
-                builder.add(piece.positions, piece.normals, piece.colors, opacities, None, column(piece, scalar), classes(piece), offset)
+                builder.add(piece.positions, piece.normals, piece.colors, opacities, radius, column(piece, scalar), classes(piece), offset)
                 scans.add(piece.scalars)
             yield jobs.Pause()
         if not shown:  # colors that are black everywhere are none, and hide nobody

@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from .. import importers, jobs, native, preferences, streaming
 from ..importers import crs
@@ -167,7 +168,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     found = _opened(source)
     if found:
         return found
-    pieces = importers.in_pieces(source.path, building.LARGE, building.names_of(source.scalar))
+    pieces = yield from importers.in_pieces(source.path, building.LARGE, building.names_of(source.scalar), progress)
     if pieces:
         try:
             return (yield from _build(source, pieces, progress))
@@ -284,7 +285,7 @@ def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: 
     if found.scans:  # at once: another Blender may let the cloud without go
         found.cloud.scan_file = shutil.copyfile(found.cloud.scan_file, source.kept.with_suffix(SCAN_ENDING))
     with progress.inner() as inner:
-        task = analyzing.start(found.cloud, analysis.of_columns(found.scanners), inner)
+        task = analyzing.start(found.cloud, analysis.of_columns(found.scanners, _scan_of(found)), inner)
     yield task
     task.result()
     try:
@@ -300,6 +301,14 @@ def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: 
         _let_go(bare.kept)
     _tidy(source.kept)
     return known
+
+
+def _scan_of(found: Linked) -> np.ndarray | None:
+    """The scan of each point, where that is written beside the cloud and a scanner is known for it."""
+    if found.scans is None or not found.scanners:
+        return None
+    numbers = np.array(found.scans.numbers, np.uint16)
+    return numbers[np.fromfile(found.cloud.scan_file, np.uint16)]
 
 
 def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:

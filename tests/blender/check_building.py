@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Linked clouds of large files are built on the disk, and are what they are where they are built in memory."""
 
+import re
 import subprocess
 import sys
 import time
@@ -8,10 +9,11 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from check_formats import e57_file
 from check_import import import_ply
 from harness import SCRATCH, Skip, check, new_scene, render
-from patina import importers, memory, native
-from patina.importers import las
+from patina import importers, jobs, memory, native
+from patina.importers import e57, las, library
 from patina.sync import building, linked
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
@@ -56,16 +58,20 @@ class Small:
     """Within: files of more than LEAST points are large, and read in pieces of 7000."""
 
     def __enter__(self):
-        self.kept = building.LARGE, las.SMALL_PIECE
-        building.LARGE, las.SMALL_PIECE = LEAST, 7000
+        self.kept = building.LARGE, las.SMALL_PIECE, library.SMALL_PIECE
+        building.LARGE, las.SMALL_PIECE, library.SMALL_PIECE = LEAST, 7000, 7000
 
     def __exit__(self, *_):
-        building.LARGE, las.SMALL_PIECE = self.kept
+        building.LARGE, las.SMALL_PIECE, library.SMALL_PIECE = self.kept
 
 
 def forget(source):
     for path in SCRATCH.glob(source.kept.name.split("-")[0] + "-*"):
         path.unlink()
+
+
+def in_pieces(path, least):
+    return jobs.finish(importers.in_pieces(path, least, (), importers.Progress()))
 
 
 def both(path, **wanted):
@@ -125,6 +131,103 @@ def test_same_extras():
         whole, pieces = both(path, **wanted)
         check(whole == pieces, f"{wanted}: differs")
     check(linked.load(linked.source(path)).cloud.has_normals, "no normals")
+
+
+PLACE = (("x", "f8"), ("y", "f8"), ("z", "f8"))
+BYTES = (("red", "u1"), ("green", "u1"), ("blue", "u1"))
+WIDE = tuple((name, "u2") for name, _ in BYTES)
+NORMALS = (("nx", "f4"), ("ny", "f4"), ("nz", "f4"))
+SPLATS = tuple((name, "f4") for name in ("f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"))
+
+
+def ply_file(name, fields, count=60000, behind="", **changes):
+    """A wavy ground far away, whose other columns are numbers; behind: an element that the points' rows are followed by."""
+    rng = np.random.default_rng(6)
+    rows = np.zeros(count, [(field, f"<{kind}") for field, kind in fields])
+    for field, kind in fields:
+        rows[field] = rng.uniform(0.1, 1.0, count) if kind[0] == "f" else rng.integers(0, 7, count)
+    for axis in "xyz":
+        rows[axis] = rng.uniform(-2, 2, count) + FAR["xyz".index(axis)] if axis != "z" else 0.2 * np.sin(3 * (rows["x"] - FAR[0]))
+    rows["x"][::977] = np.nan
+    for field, value in changes.items():
+        rows[field] = value
+    words = {"f8": "double", "f4": "float", "u1": "uchar", "u2": "ushort"}
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\n"
+    head += "".join(f"property {words[kind]} {field}\n" for field, kind in fields)
+    path = SCRATCH / name
+    path.write_bytes((head + behind + "end_header\n").encode() + rows.tobytes() + (bytes([3]) + np.arange(3, dtype="<i4").tobytes() if behind else b""))
+    return path
+
+
+FACE = "element face 1\nproperty list uchar int vertex_indices\n"
+
+
+def test_same_ply():
+    """The same of PLYs: colors of bytes, of 16 bits, black ones; classes and scalars; splats; one whose faces give it normals, which is read whole."""
+    whole = ply_file("large.ply", (*PLACE, *BYTES, *NORMALS, ("classification", "u1"), ("scan", "u1"), ("heat", "f4")))
+    for what, wanted in ((whole, {"scalar": "heat"}), (whole, {"origin": (499999.0, 5000001.0, 90.0), "analyzed": False}),
+                         (ply_file("large_wide.ply", (*PLACE, *WIDE)), {}),
+                         (ply_file("large_black.ply", (*PLACE, *BYTES, *NORMALS), red=0, green=0, blue=0, nx=0, ny=0, nz=0), {"analyzed": False}),
+                         (ply_file("large_hidden.ply", (*PLACE, *BYTES), red=0, green=0), {"hide_uncolored": True}),
+                         (ply_file("large_splats.ply", (*PLACE, *SPLATS)), {"scalar": "opacity"}),
+                         (ply_file("large_splats2.ply", (*PLACE, *SPLATS)), {"hide_uncolored": True}),
+                         (ply_file("large_faces.ply", PLACE, behind=FACE), {})):
+        in_memory, pieces = both(what, **wanted)
+        for ending in in_memory:
+            check(in_memory[ending] == pieces[ending], f"{what.name} {wanted}: {ending} differs")
+    check(in_pieces(whole, LEAST) is not None, "a large PLY is read whole")
+    check(in_pieces(SCRATCH / "large_faces.ply", LEAST) is None, "faces in pieces")
+    check(in_pieces(whole, 60000) is None, "a small PLY in pieces")
+
+
+def scanned(count, seed, **more):
+    """A wavy ground in a scan of an E57 (check_formats.e57_file)."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(-2, 2, (2, count))
+    found = {f"cartesian{axis}": ("float", (), values) for axis, values in zip("XYZ", (x, y, 0.2 * np.sin(3 * x) * np.cos(2 * y)), strict=True)}
+    found["cartesianInvalidState"] = ("integer", (0, 2), np.arange(count) % 331 == 7)
+    for name in ("Red", "Green", "Blue"):
+        found[f"color{name}"] = ("integer", (0, 255), rng.integers(1, 200, count))
+    found["intensity"] = ("float", (), rng.uniform(0, 1, count))
+    found["classification"] = ("integer", (0, 255), rng.integers(1, 7, count))
+    return found | more
+
+
+def test_same_e57():
+    """The same of an E57 of two scans, of which one has no classes; one with a grid is read whole."""
+    turned = ((0.8, 0.0, 0.0, 0.6), (500010.0, 5000000.0, 4.0))
+    second = scanned(20000, 2, pose=turned)
+    del second["classification"]
+    path = e57_file("large.e57", scanned(30000, 1, pose=((1.0, 0.0, 0.0, 0.0), (500000.0, 5000000.0, 3.0))), second)
+    size, e57.SMALL_PIECE = e57.SMALL_PIECE, 7000
+    try:
+        for wanted in ({"scalar": "intensity"}, {"analyzed": False, "origin": (499999.0, 5000001.0, 90.0)}, {"hide_uncolored": True}):
+            whole, pieces = both(path, **wanted)
+            for ending in (".cloud", ".scan"):
+                check(whole[ending] == pieces[ending], f"{wanted}: {ending} differs")
+            check(re.sub(rb"\d+\.\d+(e-?\d+)?", b"n", whole[".json"]) == re.sub(rb"\d+\.\d+(e-?\d+)?", b"n", pieces[".json"]), f"{wanted}: the notes differ")
+        check(both(path)[1][".scan"] is not None, "no scans")
+        check(in_pieces(path, LEAST) is not None, "a large E57 is read whole")
+        gridded = scanned(12000, 3, rowIndex=("integer", (0, 200), np.arange(12000) // 100), columnIndex=("integer", (0, 200), np.arange(12000) % 100))
+        check(in_pieces(e57_file("large_grid.e57", gridded), LEAST) is None, "a grid in pieces")
+    finally:
+        e57.SMALL_PIECE = size
+
+
+def test_cut_ply():
+    """A PLY that ends too early is refused by both ways, with one message."""
+    path = ply_file("large_whole.ply", (*PLACE, *BYTES))
+    cut = SCRATCH / "large_cut.ply"
+    cut.write_bytes(path.read_bytes()[:-400])
+    source = linked.source(cut)
+    with Small():
+        try:
+            linked.load(source)
+        except native.PatinaError as error:
+            check("cut short" in str(error) and "60000 rows" in str(error), str(error))
+        else:
+            check(False, "a cut file was read")
+    check(not source.kept.exists(), "a cloud was kept")
 
 
 def test_same_picture():
