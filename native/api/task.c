@@ -103,7 +103,7 @@ static int verify(struct patina_task *task) { return patina_cloud_verify(task->p
 
 static int analyse(struct patina_task *task)
 {
-    return pt_analysis_compute(task->painted, &task->analyse, task->progress, &task->analysis);
+    return pt_analysis_compute(task->painted, &task->analyse, NULL, task->progress, &task->analysis);
 }
 
 static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&task->desc, task->fingerprint); }

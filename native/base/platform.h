@@ -89,8 +89,8 @@ void *pt_pages_reserve(size_t size);
 void pt_pages_forget(void *pages, size_t size);
 void pt_pages_free(void *pages,
                    size_t size); // of pt_pages_alloc, pt_pages_reserve or pt_disk_map, NULL is fine; size as asked for
-// Of pt_disk_map, never written. What is returned is held no longer, and comes again from the file when it is read (macOS: it goes
-// first when memory lacks); others may read it meanwhile. What is expected is read soon: the disk may begin. Any part of a mapping.
+// Of pt_disk_map, shared or never written. What is returned is held no longer, and comes again from the file when it is read (macOS: it
+// goes first when memory lacks); others may read and write it meanwhile. What is expected is read soon: the disk may begin. Any part of a mapping.
 void pt_pages_return(void *pages, size_t size);
 void pt_pages_expect(void *pages, size_t size);
 
@@ -109,14 +109,17 @@ int pt_disk_open(const char *path, struct pt_disk *disk); // folders and pipes o
 void pt_disk_close(struct pt_disk *disk);                 // what is mapped stays
 // Less than `size` bytes come at the file's end alone.
 int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t size, size_t *got);
-// Pages of the file; they go back by pt_pages_free. Writing changes the process's own copy, never the file. Another process that cuts
-// the file short meanwhile ends this one by a fault: the price of not copying. offset: a multiple of 64 KiB; size: not 0.
-enum pt_disk_use { PT_DISK_ONCE, PT_DISK_ANYWHERE }; // read once from end to end, or here and there
+// Pages of the file; they go back by pt_pages_free. Writing changes the process's own copy, never the file, but for PT_DISK_SHARED, of a
+// spill. Another process that cuts the file short meanwhile ends this one by a fault: the price of not copying. offset: a multiple of
+// 64 KiB; size: not 0.
+enum pt_disk_use { PT_DISK_ONCE, PT_DISK_ANYWHERE, PT_DISK_SHARED }; // read once from end to end; here and there; written too
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data);
 
 // A file without a name, for what memory has no room for: it goes with its handle, and with a process that is killed. path: a file that it
 // lies on the same disk with. Read by pt_disk_read, by one thread at a time as long as somebody writes.
 int pt_disk_spill(const char *path, struct pt_disk *disk);
+int pt_disk_reserve(struct pt_disk *disk,
+                    uint64_t size); // makes it so long, of zeros, and the disk has room for them: of an empty spill
 int pt_disk_write(struct pt_disk *disk, uint64_t offset, const void *data, size_t size);
 int pt_disk_room(const char *path, uint64_t *bytes); // that this user may yet write where the file lies, or would
 

@@ -249,8 +249,8 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
 
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data)
 {
-    *data = mmap(NULL, size, PROT_READ | (use == PT_DISK_ANYWHERE ? PROT_WRITE : 0), MAP_PRIVATE, (int)disk->handle,
-                 (off_t)offset);
+    *data = mmap(NULL, size, PROT_READ | (use != PT_DISK_ONCE ? PROT_WRITE : 0),
+                 use == PT_DISK_SHARED ? MAP_SHARED : MAP_PRIVATE, (int)disk->handle, (off_t)offset);
     if (*data == MAP_FAILED) {
         *data = NULL;
         return errno;
@@ -282,6 +282,23 @@ int pt_disk_spill(const char *path, struct pt_disk *disk)
         unlink(name);
     free(name);
     *disk = (struct pt_disk){.handle = descriptor, .kind = PT_DISK_FILE};
+    return error;
+}
+
+int pt_disk_reserve(struct pt_disk *disk, uint64_t size)
+{
+#ifdef __APPLE__
+    fstore_t wanted = {.fst_flags = F_ALLOCATEALL, .fst_posmode = F_PEOFPOSMODE, .fst_length = (off_t)size};
+    int error = fcntl((int)disk->handle, F_PREALLOCATE, &wanted) < 0 ? errno : 0;
+    if (!error && ftruncate((int)disk->handle, (off_t)size))
+        error = errno;
+#else
+    int error;
+    do
+        error = posix_fallocate((int)disk->handle, 0, (off_t)size);
+    while (error == EINTR);
+#endif
+    disk->size = error ? disk->size : size;
     return error;
 }
 

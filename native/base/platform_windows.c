@@ -327,10 +327,13 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
 
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data)
 {
-    const int copy = use == PT_DISK_ANYWHERE;
-    const HANDLE section = CreateFileMappingW((HANDLE)disk->handle, NULL, copy ? PAGE_WRITECOPY : PAGE_READONLY, 0, 0, NULL);
-    *data = section ? MapViewOfFile(section, copy ? FILE_MAP_COPY : FILE_MAP_READ, (DWORD)(offset >> 32), (DWORD)offset, size)
-                    : NULL;
+    static const struct {
+        DWORD pages, view;
+    } uses[] = {[PT_DISK_ONCE] = {PAGE_READONLY, FILE_MAP_READ},
+                [PT_DISK_ANYWHERE] = {PAGE_WRITECOPY, FILE_MAP_COPY},
+                [PT_DISK_SHARED] = {PAGE_READWRITE, FILE_MAP_WRITE}};
+    const HANDLE section = CreateFileMappingW((HANDLE)disk->handle, NULL, uses[use].pages, 0, 0, NULL);
+    *data = section ? MapViewOfFile(section, uses[use].view, (DWORD)(offset >> 32), (DWORD)offset, size) : NULL;
     const int error = *data ? 0 : last_error();
     if (section)
         CloseHandle(section); // the view holds it
@@ -435,6 +438,15 @@ int pt_disk_spill(const char *path, struct pt_disk *disk)
     free(wide);
     *disk = (struct pt_disk){.handle = (intptr_t)handle, .kind = PT_DISK_FILE};
     return error;
+}
+
+int pt_disk_reserve(struct pt_disk *disk, uint64_t size)
+{
+    FILE_END_OF_FILE_INFO end = {.EndOfFile = {.QuadPart = (LONGLONG)size}};
+    if (!SetFileInformationByHandle((HANDLE)disk->handle, FileEndOfFileInfo, &end, sizeof end))
+        return last_error();
+    disk->size = size;
+    return 0;
 }
 
 int pt_disk_write(struct pt_disk *disk, uint64_t offset, const void *data, size_t size)

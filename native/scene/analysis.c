@@ -23,6 +23,7 @@ struct walk {
     const patina_cloud *cloud;
     const patina_analysis_desc *desc;
     struct pt_analysis *out;
+    struct pt_store *store;
     struct pt_neighbours tree, coarse;
     struct pt_beams beams;
     struct pt_grids grids;
@@ -203,6 +204,7 @@ static int lies_in_rows(const struct walk *walk)
             flat += hood->kind == PT_KIND_SURFACE;
             uneven += hood->kind == PT_KIND_SURFACE && hood->uneven > PT_UNEVEN_ROWS;
         }
+        pt_store_look(walk->store);
     }
     return 2 * uneven > flat;
 }
@@ -246,6 +248,7 @@ static void finish_chunk(struct walk *walk, struct pt_chunk *chunk, float *spaci
     }
 }
 
+// Neighbours one after another, whatever level they are of: what they read lies side by side.
 static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct walk *walk = context;
@@ -253,7 +256,8 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     struct pt_neighbourhood hoods[PT_LEAF];
     float spacings[PT_CHUNK_POINTS];
     (void)thread;
-    for (uint32_t c = begin; c < end; c++) {
+    for (uint32_t i = begin; i < end; i++) {
+        const uint32_t c = walk->tree.chunk_order[i];
         struct limited limited = {walk, c};
         uint32_t known = 0;
         for (uint32_t leaf = walk->tree.chunk_leaf[c]; leaf < walk->tree.chunk_leaf[c + 1]; leaf++) {
@@ -266,6 +270,7 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
                 if (hoods[lane].sampled > 0.0)
                     spacings[known++] = (float)hoods[lane].sampled;
             }
+            pt_store_look(walk->store);
         }
         finish_chunk(walk, &walk->out->chunks[c], spacings, known);
         uint32_t done = atomic_fetch_add_explicit(&walk->done, 1, memory_order_relaxed) + 1;
@@ -345,6 +350,7 @@ static int mark_free_space(struct walk *walk, struct pt_pool *pool)
                                 .progress = walk->progress,
                                 .begin = 0.8,
                                 .end = 1.0,
+                                .store = walk->store,
                                 .shapes = walk->out->shapes,
                                 .sights = &walk->out->sights};
     const int error = pt_free_space_mark(&job, pool);
@@ -363,15 +369,18 @@ static int vote_sides(struct walk *walk, struct pt_pool *pool)
     if (!unoriented)
         return PATINA_OK;
     const size_t size = (cloud->slots / 32 + 1) * sizeof(uint32_t);
-    uint32_t *told = walk->given ? pt_pages_alloc(size) : NULL;
+    uint32_t *told = walk->given ? pt_store_alloc(walk->store, size) : NULL;
     if (walk->given && !told)
         return PATINA_ERROR_MEMORY;
-    for (uint32_t slot = 0; told && slot < cloud->slots; slot++)
+    for (uint32_t slot = 0; told && slot < cloud->slots; slot++) {
         told[slot / 32] |= (uint32_t)((cloud->surfels[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE) << slot % 32;
+        if (slot % PT_CHUNK_POINTS == 0)
+            pt_store_look(walk->store);
+    }
     walk->out->oriented = PATINA_SIDES_VOTED;
     const int error = pt_orient(&walk->tree, walk->out->chunks, told, walk->out->surfels, walk->out->shapes, pool,
                                 walk->progress, 0.85, 1.0);
-    pt_pages_free(told, size);
+    pt_store_free(walk->store, told, size);
     return error;
 }
 
@@ -381,8 +390,8 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     struct pt_analysis *out = walk->out;
     walk->tallies = calloc(cloud->chunk_count + 1, sizeof *walk->tallies);
     out->chunks = malloc((cloud->chunk_count + 1) * sizeof *out->chunks);
-    out->surfels = pt_pages_alloc(out->slots * 4);
-    out->shapes = pt_pages_alloc(out->slots * 4);
+    out->surfels = pt_store_alloc(walk->store, out->slots * 4);
+    out->shapes = pt_store_alloc(walk->store, out->slots * 4);
     if (!walk->tallies || !out->chunks || !out->surfels || !out->shapes)
         return PATINA_ERROR_MEMORY;
     if (cloud->chunk_count)
@@ -390,11 +399,11 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     out->spacing_base = base_of(cloud);
     int error = pt_beams_create(cloud, walk->desc, pool, &walk->beams);
     if (!error)
-        error = pt_grids_create(cloud, walk->desc, pool, walk->progress, &walk->grids);
+        error = pt_grids_create(cloud, walk->desc, walk->store, pool, walk->progress, &walk->grids);
     if (!error)
-        error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, pool, walk->progress, 0.0, 0.04);
+        error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, walk->store, pool, walk->progress, 0.0, 0.04);
     if (!error)
-        error = pt_neighbours_create(&walk->coarse, cloud, FAR_STRATA, pool, walk->progress, 0.04, 0.05);
+        error = pt_neighbours_create(&walk->coarse, cloud, FAR_STRATA, walk->store, pool, walk->progress, 0.04, 0.05);
     if (error) {
         pt_neighbours_destroy(&walk->tree);
         return error;
@@ -414,6 +423,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
         out->estimated += walk->tallies[c].estimated;
     }
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        pt_store_look(walk->store);
         gather_shapes(&out->chunks[c], out->shapes + out->chunks[c].first);
         out->chunks[c].cone_cosine = -2.0f;
         if (out->oriented)
@@ -423,8 +433,22 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     return PATINA_OK;
 }
 
-int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress,
-                        struct pt_analysis *out)
+static int tell(const struct patina_cloud *cloud, const struct pt_store *store, int error)
+{
+    char text[128];
+    if (error == PATINA_ERROR_CANCELLED)
+        return pt_fail(NULL, error, "analysing the cloud was cancelled");
+    if (store && store->error)
+        return pt_fail(NULL, PATINA_ERROR_FILE, "%s: analysing %llu points beside it: %s", store->beside,
+                       (unsigned long long)cloud->info.drawn, pt_error_text(store->error, text, sizeof text));
+    return pt_fail(NULL, error, "analysing %llu points: out of memory", (unsigned long long)cloud->info.drawn);
+}
+
+// Words, trees of all points and of an eighth, votes twice, and who was told.
+uint64_t pt_analysis_memory(const patina_cloud *cloud) { return cloud->slots * 36; }
+
+int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_store *store,
+                        patina_progress *progress, struct pt_analysis *out)
 {
     *out = (struct pt_analysis){0};
     const int refused = pt_paged_refuse(cloud, "patina_cloud_analyse");
@@ -435,11 +459,14 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
     struct walk walk = {.cloud = cloud,
                         .desc = &checked,
                         .out = out,
+                        .store = store,
                         .progress = progress,
                         .k = desc->neighbours ? desc->neighbours : NEIGHBOURS,
                         .given = cloud->info.has_normals && cloud->info.normals_oriented != PATINA_SIDES_VOTED};
-    *out = (struct pt_analysis){.slots = cloud->slots};
+    *out = (struct pt_analysis){.store = store, .slots = cloud->slots};
     struct pt_pool *pool = pt_pool_create(pt_pool_threads_for(desc->threads, cloud->info.count), 0);
+    if (pool && store)
+        pt_pool_watch(pool, pt_store_look, store);
     int error = pool ? compute(&walk, pool) : PATINA_ERROR_MEMORY;
     pt_pool_destroy(pool);
     pt_beams_destroy(&walk.beams);
@@ -447,16 +474,13 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
     free(walk.tallies);
     if (error)
         pt_analysis_free(out);
-    return !error ? PATINA_OK
-           : error == PATINA_ERROR_CANCELLED
-               ? pt_fail(NULL, error, "analysing the cloud was cancelled")
-               : pt_fail(NULL, error, "analysing %llu points: out of memory", (unsigned long long)cloud->info.drawn);
+    return error ? tell(cloud, store, error) : PATINA_OK;
 }
 
 void pt_analysis_free(struct pt_analysis *analysis)
 {
-    pt_pages_free(analysis->surfels, analysis->slots * 4);
-    pt_pages_free(analysis->shapes, analysis->slots * 4);
+    pt_store_free(analysis->store, analysis->surfels, analysis->slots * 4);
+    pt_store_free(analysis->store, analysis->shapes, analysis->slots * 4);
     free(analysis->chunks);
     pt_sights_free(&analysis->sights);
     *analysis = (struct pt_analysis){0};
@@ -507,7 +531,7 @@ int patina_cloud_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, 
     int error = pt_take(NULL, "patina_cloud_analyse", desc, &checked, sizeof checked);
     error = error ? error : pt_analysis_check(cloud, &checked);
     if (!error)
-        error = pt_analysis_compute(cloud, &checked, progress, &analysis);
+        error = pt_analysis_compute(cloud, &checked, NULL, progress, &analysis);
     if (!error) {
         error = pt_analysis_apply(cloud, &analysis);
         pt_analysis_free(&analysis);

@@ -8,6 +8,7 @@
 #include "sights.h"
 
 struct pt_analysis {
+    struct pt_store *store;     // where these arrays lie
     uint32_t *surfels, *shapes; // slots
     struct pt_chunk *chunks;
     uint64_t slots;
@@ -18,10 +19,13 @@ struct pt_analysis {
 };
 
 int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *desc);
-// 0 or an error with its message at the thread. Arrays of the descriptor are read.
-int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress,
-                        struct pt_analysis *out);
+// 0 or an error with its message at the thread. Arrays of the descriptor are read. store: for what memory has no room for, NULL: it has;
+// it outlives `out`. The same bytes with and without.
+int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_store *store,
+                        patina_progress *progress, struct pt_analysis *out);
 int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis); // takes its arrays
+// What it takes at most beside the cloud, bytes; without grids and free space.
+uint64_t pt_analysis_memory(const patina_cloud *cloud);
 void pt_analysis_free(struct pt_analysis *analysis);
 
 // Bit of shape words that no kernel reads: another surface lies beside the point's own, not farther than its neighbours reach.

@@ -153,7 +153,7 @@ static int read_all(struct reading *reading, struct pt_pool *pool)
     pt_parallel(pool, reading->cloud->chunk_count, 1, read_chunks, reading);
     if (!to->numbers && !to->distances && !to->soft_radius && !to->uncertainty)
         return PATINA_OK;
-    int error = pt_neighbours_create(&reading->tree, reading->cloud, PT_STRATA, pool, reading->progress, 0.0, 0.1);
+    int error = pt_neighbours_create(&reading->tree, reading->cloud, PT_STRATA, NULL, pool, reading->progress, 0.0, 0.1);
     if (error)
         return error;
     reading->uncertainty = to->uncertainty;

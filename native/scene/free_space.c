@@ -205,6 +205,7 @@ static uint64_t settle(const struct pt_free_space *job)
             shapes[i] &= shapes[i] & MET ? ~(MET | PT_SHAPE_SEEN_THROUGH) : ~0u;
             marked += (shapes[i] & PT_SHAPE_SEEN_THROUGH) != 0;
         }
+        pt_store_look(job->store);
         for (uint32_t i = chunk->count; i < chunk->padded; i++)
             shapes[i] = shapes[chunk->count - 1];
     }
@@ -230,13 +231,13 @@ static int look_through(struct look *look, struct pt_pool *pool)
     look->cell[0] = 2.0 * PI / look->across;
     look->cell[1] = PI / look->up;
     const size_t bytes = (size_t)look->across * look->up * sizeof *look->grid;
-    look->grid = pt_pages_alloc(bytes);
+    look->grid = pt_store_alloc(pt_store_is_small(look->job->store, bytes) ? NULL : look->job->store, bytes);
     if (!look->grid)
         return PATINA_ERROR_MEMORY;
     if (look->job->sights) {
         const double widest = fmax(interval->azimuth, interval->elevation), share = fmax(widest, farther_share);
         if (pt_sight_begin(&look->sight, look->eye, pt_sight_across(widest, look->job->desc->station_count), share)) {
-            pt_pages_free(look->grid, bytes);
+            pt_store_free(look->job->store, look->grid, bytes);
             return PATINA_ERROR_MEMORY;
         }
     }
@@ -247,7 +248,7 @@ static int look_through(struct look *look, struct pt_pool *pool)
     memcpy(&farthest, &bits, sizeof farthest);
     look->farthest = (double)farthest;
     pt_parallel(pool, look->job->cloud->chunk_count, 4, judge_chunks, look);
-    pt_pages_free(look->grid, bytes);
+    pt_store_free(look->job->store, look->grid, bytes);
     if (look->job->sights)
         pt_sight_end(&look->sight, look->farthest, look->job->sights);
     return PATINA_OK;
@@ -284,8 +285,11 @@ int pt_free_space_mark(struct pt_free_space *free_space, struct pt_pool *pool)
     const patina_analysis_desc *desc = free_space->desc;
     int error = free_space->sights ? reserve_sights(free_space) : PATINA_OK;
     free_space->marked = 0;
-    for (uint64_t i = 0; i < free_space->cloud->slots; i++)
+    for (uint64_t i = 0; i < free_space->cloud->slots; i++) {
         free_space->shapes[i] &= ~(PT_SHAPE_SEEN_THROUGH | MET);
+        if (i % PT_CHUNK_POINTS == 0)
+            pt_store_look(free_space->store);
+    }
     for (uint32_t s = 0; s < desc->station_count && !error; s++) {
         struct look look = look_from(free_space, s);
         error = look_through(&look, pool);

@@ -13,6 +13,7 @@ struct pt_free_space {
     double spacing_base;              // that sigmas in the shapes are in
     patina_progress *progress;        // goes from `begin` to `end`
     double begin, end;
+    struct pt_store *store;   // where a grid lies that is no small part of memory; NULL: there
     uint32_t *shapes;         // slots: PT_SHAPE_SEEN_THROUGH is set and cleared
     uint64_t marked;          // how many points have it
     struct pt_sights *sights; // what the stations saw, for pictures: empty before, the caller's in any case. NULL: not wanted

@@ -24,6 +24,7 @@ struct pt_grid_of {
     struct pt_scan scan;
     double origin[3], direction[3];
     uint32_t station, directed; // UINT32_MAX: none; directed: beams are parallel
+    int of_use;
 };
 
 enum side {
@@ -57,7 +58,7 @@ static void place_in(const struct patina_cloud *cloud, const struct pt_chunk *ch
 static int survey(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_grids *out)
 {
     uint32_t most = 0;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+    for (uint32_t c = 0; c < cloud->chunk_count; pt_store_look(out->store), c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++) {
             const uint32_t scan = scan_of(desc, pt_number_of(cloud, cloud->chunks[c].first + i));
             most = scan > most ? scan : most;
@@ -66,7 +67,7 @@ static int survey(const struct patina_cloud *cloud, const patina_analysis_desc *
     if (!out->each)
         return PATINA_ERROR_MEMORY;
     out->count = most + 1;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+    for (uint32_t c = 0; c < cloud->chunk_count; pt_store_look(out->store), c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++) {
             const struct pt_chunk *chunk = &cloud->chunks[c];
             const uint32_t number = pt_number_of(cloud, chunk->first + i);
@@ -102,7 +103,7 @@ static int stand(const patina_analysis_desc *desc, uint32_t number, struct pt_gr
 // Of points in the same cell the first by the caller's order stays.
 static void fill_cells(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_grids *out)
 {
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+    for (uint32_t c = 0; c < cloud->chunk_count; pt_store_look(out->store), c++)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++) {
             const struct pt_chunk *chunk = &cloud->chunks[c];
             const uint32_t slot = chunk->first + i, number = pt_number_of(cloud, slot);
@@ -134,27 +135,36 @@ static void measure(void *context, uint32_t begin, uint32_t end, uint32_t thread
             atomic_store(&measuring->failed, 1);
 }
 
-int pt_grids_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_pool *pool,
-                    struct patina_progress *progress, struct pt_grids *out)
+int pt_grids_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_store *store,
+                    struct pt_pool *pool, struct patina_progress *progress, struct pt_grids *out)
 {
-    *out = (struct pt_grids){.slots = cloud->slots};
+    *out = (struct pt_grids){.slots = cloud->slots, .store = store};
     if (!desc->grid || !desc->row.data || !desc->column.data || !cloud->chunk_count)
         return PATINA_OK;
     int error = survey(cloud, desc, out);
-    out->position = error ? NULL : pt_pages_alloc(12 * (size_t)cloud->slots);
+    out->position = error ? NULL : pt_store_alloc(store, 12 * (size_t)cloud->slots);
     error = out->position ? PATINA_OK : PATINA_ERROR_MEMORY;
     for (uint32_t s = 0; s < out->count && !error; s++) {
         struct pt_grid_of *of = &out->each[s];
         const uint64_t cells = (uint64_t)of->scan.columns * of->scan.rows;
         // A grid that is nearly empty is none, and its numbers may be anything.
-        if (!stand(desc, s, of) || of->scan.columns < 2 || of->scan.rows < 2 || cells > 64 * of->scan.count + 65536)
+        of->of_use = stand(desc, s, of) && of->scan.columns > 1 && of->scan.rows > 1 && cells <= 64 * of->scan.count + 65536;
+        out->cell_count += of->of_use ? cells : 0;
+    }
+    out->cells = error ? NULL : pt_store_alloc(store, out->cell_count * sizeof *out->cells);
+    error = error ? error : out->cells ? PATINA_OK : PATINA_ERROR_MEMORY;
+    uint32_t *next = out->cells;
+    for (uint32_t s = 0; s < out->count && !error; s++) {
+        struct pt_grid_of *of = &out->each[s];
+        const size_t cells = (size_t)of->scan.columns * of->scan.rows;
+        if (!of->of_use)
             continue;
         of->grid.scan = &of->scan;
         of->grid.position = out->position;
-        of->grid.points = pt_pages_alloc(cells * sizeof *of->grid.points);
-        error = of->grid.points ? PATINA_OK : PATINA_ERROR_MEMORY;
-        if (!error)
-            memset(of->grid.points, 0xFF, cells * sizeof *of->grid.points);
+        of->grid.points = next;
+        memset(next, 0xFF, cells * sizeof *next);
+        next += cells;
+        pt_store_look(store);
     }
     if (!error)
         fill_cells(cloud, desc, out);
@@ -172,10 +182,8 @@ int pt_grids_create(const struct patina_cloud *cloud, const patina_analysis_desc
 
 void pt_grids_destroy(struct pt_grids *grids)
 {
-    for (uint32_t s = 0; s < grids->count; s++)
-        pt_pages_free(grids->each[s].grid.points,
-                      (size_t)grids->each[s].scan.columns * grids->each[s].scan.rows * sizeof(uint32_t));
-    pt_pages_free(grids->position, 12 * (size_t)grids->slots);
+    pt_store_free(grids->store, grids->cells, grids->cell_count * sizeof *grids->cells);
+    pt_store_free(grids->store, grids->position, 12 * (size_t)grids->slots);
     free(grids->each);
     *grids = (struct pt_grids){0};
 }

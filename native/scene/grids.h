@@ -11,12 +11,14 @@ struct pt_grids {
     uint32_t count; // of scans; 0: nobody asked for their grids
     struct pt_grid_of *each;
     float *position; // 3 a slot, from its scan's origin
-    uint64_t slots;
+    uint32_t *cells; // of all scans
+    uint64_t slots, cell_count;
+    struct pt_store *store; // where these lie, and the cells
 };
 
 // Of the descriptor, whose strides are explicit. 0, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED. pool: as pt_parallel takes it.
-int pt_grids_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_pool *pool,
-                    struct patina_progress *progress, struct pt_grids *out);
+int pt_grids_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_store *store,
+                    struct pt_pool *pool, struct patina_progress *progress, struct pt_grids *out);
 void pt_grids_destroy(struct pt_grids *grids);
 
 // What the grid tells of the point in a slot, by its number in the caller's order, goes into hood, which its neighbours in space

@@ -192,10 +192,11 @@ uint32_t pt_neighbours_of_chunk(const struct pt_neighbours *tree, uint32_t chunk
     return pt_chunk_prefix(&tree->cloud->chunks[chunk], tree->strata);
 }
 
-int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, uint32_t strata, struct pt_pool *pool,
-                         struct patina_progress *progress, double begin, double end)
+int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, uint32_t strata, struct pt_store *store,
+                         struct pt_pool *pool, struct patina_progress *progress, double begin, double end)
 {
-    *tree = (struct pt_neighbours){.cloud = cloud, .chunk_count = cloud->chunk_count, .strata = strata, .level = best_level()};
+    *tree = (struct pt_neighbours){
+        .cloud = cloud, .store = store, .chunk_count = cloud->chunk_count, .strata = strata, .level = best_level()};
     int error = PATINA_ERROR_MEMORY;
     tree->chunk_leaf = malloc((cloud->chunk_count + 1) * sizeof *tree->chunk_leaf);
     if (!tree->chunk_leaf)
@@ -207,10 +208,10 @@ int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *
     tree->chunk_leaf[cloud->chunk_count] = tree->leaf_count;
     for (int k = 0; k < 3 && cloud->chunk_count; k++)
         tree->origin[k] = cloud->chunks[0].origin[k];
-    tree->places = pt_pages_alloc((size_t)tree->leaf_count * PT_LEAF * 12);
-    tree->slots = pt_pages_alloc((size_t)tree->leaf_count * PT_LEAF * 4);
-    tree->leaf_chunk = pt_pages_alloc((size_t)tree->leaf_count * 4);
-    tree->nodes = pt_pages_alloc((size_t)tree->leaf_count * 2 * sizeof *tree->nodes);
+    tree->places = pt_store_alloc(store, (size_t)tree->leaf_count * PT_LEAF * 12);
+    tree->slots = pt_store_alloc(store, (size_t)tree->leaf_count * PT_LEAF * 4);
+    tree->leaf_chunk = pt_store_alloc(store, (size_t)tree->leaf_count * 4);
+    tree->nodes = pt_store_alloc(store, (size_t)tree->leaf_count * 2 * sizeof *tree->nodes);
     tree->chunk_nodes = malloc((2 * (size_t)cloud->chunk_count + 1) * sizeof *tree->chunk_nodes);
     tree->chunk_order = malloc((cloud->chunk_count + 1) * sizeof *tree->chunk_order);
     if (tree->places && tree->slots && tree->leaf_chunk && tree->nodes && tree->chunk_nodes && tree->chunk_order)
@@ -227,10 +228,10 @@ int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *
 
 void pt_neighbours_destroy(struct pt_neighbours *tree)
 {
-    pt_pages_free(tree->places, (size_t)tree->leaf_count * PT_LEAF * 12);
-    pt_pages_free(tree->slots, (size_t)tree->leaf_count * PT_LEAF * 4);
-    pt_pages_free(tree->leaf_chunk, (size_t)tree->leaf_count * 4);
-    pt_pages_free(tree->nodes, (size_t)tree->leaf_count * 2 * sizeof *tree->nodes);
+    pt_store_free(tree->store, tree->places, (size_t)tree->leaf_count * PT_LEAF * 12);
+    pt_store_free(tree->store, tree->slots, (size_t)tree->leaf_count * PT_LEAF * 4);
+    pt_store_free(tree->store, tree->leaf_chunk, (size_t)tree->leaf_count * 4);
+    pt_store_free(tree->store, tree->nodes, (size_t)tree->leaf_count * 2 * sizeof *tree->nodes);
     free(tree->chunk_leaf);
     free(tree->chunk_nodes);
     free(tree->chunk_order);

@@ -6,7 +6,7 @@
 #ifndef PT_NEIGHBOURS_H
 #define PT_NEIGHBOURS_H
 
-#include "cloud.h"
+#include "store.h"
 
 enum { PT_LEAF = 16, PT_NEIGHBOURS_MOST = 64 };
 
@@ -20,6 +20,7 @@ struct pt_chunk_node { // over chunks, in the cloud's frame; widened by what its
 
 struct pt_neighbours {
     const struct patina_cloud *cloud;
+    struct pt_store *store;                   // where its arrays of points lie
     uint32_t leaf_count, chunk_count, strata; // strata: PT_STRATA, or fewer: of each chunk's first alone
     float *places;             // a leaf: x[16], y[16], z[16], relative to the chunk's origin; +inf where there is no point
     uint32_t *slots;           // of leaf * 16 + lane
@@ -41,9 +42,9 @@ struct pt_found {
 };
 
 // progress runs from `begin` to `end` of it. 0, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED; on failure nothing is left.
-// About 20 bytes a point, and the cloud must outlive it.
-int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, uint32_t strata, struct pt_pool *pool,
-                         struct patina_progress *progress, double begin, double end);
+// About 20 bytes a point, in the store where there is one; it and the cloud must outlive the tree.
+int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, uint32_t strata, struct pt_store *store,
+                         struct pt_pool *pool, struct patina_progress *progress, double begin, double end);
 void pt_neighbours_destroy(struct pt_neighbours *tree);
 
 // Points of the chunk in this tree: its first.

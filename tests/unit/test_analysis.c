@@ -37,7 +37,7 @@ static void compare_with_all(patina_cloud *cloud, uint32_t k, uint32_t looked_at
 {
     struct pt_neighbours tree;
     static struct pt_found found;
-    assert_int_equal(pt_neighbours_create(&tree, cloud, PT_STRATA, NULL, NULL, 0, 1), 0);
+    assert_int_equal(pt_neighbours_create(&tree, cloud, PT_STRATA, NULL, NULL, NULL, 0, 1), 0);
     const int best = tree.level;
     struct pcg random = pcg_seed(k);
     for (uint32_t q = 0; q < looked_at && tree.leaf_count; q++) {

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "store.h"
+
+#include <errno.h>
+#include <string.h>
+
+enum {
+    CAP_EIGHTHS = 5,   // of the memory, for what is mapped: from here on all is given back, while threads read on
+    SMALL_EIGHTHS = 2, // of it, for what lies in memory all the same
+    // As pictures look at what they hold (run/pager.c); threads that write into fresh pages take no more than 2 GB a second.
+    LOOK_LEAST = 20,
+    LOOK_MOST = 500,         // microseconds
+    BYTES_A_LOOK = 8 * 4000, // of the cap, a microsecond
+};
+
+static uint64_t microseconds(void) { return (uint64_t)(1e3 * pt_milliseconds()); }
+
+void pt_store_open(struct pt_store *store, const char *beside, const struct patina_cloud *cloud, uint64_t memory)
+{
+    *store = (struct pt_store){.beside = beside, .cloud = cloud, .memory = memory, .cap = memory / 8 * CAP_EIGHTHS};
+    const uint64_t pause = store->cap / BYTES_A_LOOK;
+    store->pause = pause < LOOK_LEAST ? LOOK_LEAST : pause < LOOK_MOST ? pause : LOOK_MOST;
+    store->before = pt_file_memory();
+}
+
+void pt_store_close(struct pt_store *store)
+{
+    while (store->count)
+        pt_store_free(store, store->arrays[0].pages, store->arrays[0].size);
+}
+
+void *pt_store_alloc(struct pt_store *store, size_t size)
+{
+    if (!store)
+        return pt_pages_alloc(size);
+    struct pt_stored *array = &store->arrays[store->count];
+    if (store->count == PT_STORE_ARRAYS) {
+        store->error = EMFILE;
+        return NULL;
+    }
+    int error = pt_disk_spill(store->beside, &array->disk);
+    if (!error) {
+        size = size ? size : 1;
+        if (!(error = pt_disk_reserve(&array->disk, size)))
+            error = pt_disk_map(&array->disk, 0, size, PT_DISK_SHARED, &array->pages);
+        if (error)
+            pt_disk_close(&array->disk);
+    }
+    if (error) {
+        store->error = error;
+        return NULL;
+    }
+    array->size = size;
+    store->count++;
+    return array->pages;
+}
+
+void pt_store_free(struct pt_store *store, void *pages, size_t size)
+{
+    uint32_t i = 0;
+    while (store && i < store->count && store->arrays[i].pages != pages)
+        i++;
+    if (!store || i == store->count) {
+        pt_pages_free(pages, size);
+        return;
+    }
+    pt_pages_free(pages, store->arrays[i].size);
+    pt_disk_close(&store->arrays[i].disk);
+    store->arrays[i] = store->arrays[--store->count];
+}
+
+int pt_store_is_small(const struct pt_store *store, uint64_t size)
+{
+    return !store || size <= store->memory / 8 * SMALL_EIGHTHS;
+}
+
+void pt_store_look(void *context)
+{
+    struct pt_store *store = context;
+    if (!store)
+        return;
+    const uint64_t now = microseconds();
+    uint64_t again = atomic_load_explicit(&store->again, memory_order_relaxed);
+    if (now < again || !atomic_compare_exchange_strong(&store->again, &again, now + store->pause))
+        return;
+    const uint64_t held = pt_file_memory();
+    if (store->before && held <= store->before + store->cap) // where nobody knows, all there may be
+        return;
+    for (uint32_t i = 0; i < store->count; i++)
+        pt_pages_return(store->arrays[i].pages, store->arrays[i].size);
+    if (store->cloud && store->cloud->mapped)
+        pt_cloud_return(store->cloud);
+    atomic_fetch_add(&store->returned, 1);
+}
