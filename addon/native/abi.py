@@ -358,6 +358,7 @@ CALLS = {
     "patina_builder_add_file": (c_void_p, c_void_p, c_char_p),
     "patina_builder_end": (c_void_p, c_void_p),
     "patina_builder_destroy": (c_void_p,),
+    "patina_cloud_analyse_file": (c_char_p, POINTER(AnalysisDesc), c_uint64, c_char_p, c_void_p),
     "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
     "patina_file_destroy": (c_void_p,),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// patina analyse FILE -o OUT.ply: what every point knows, as columns of a binary PLY.
+// patina analyse FILE -o OUT.ply: what every point knows, as columns of a binary PLY. IN.cloud -o OUT.cloud: into a saved cloud, of any size.
 #include "tool.h"
 
 #include <stdio.h>
@@ -149,10 +149,34 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, int gri
     return result;
 }
 
+static int ends_in(const char *path, const char *ending)
+{
+    const size_t length = strlen(path), size = strlen(ending);
+    return length > size && !strcmp(path + length - size, ending);
+}
+
+static int analyse_cloud(const char *in, const char *out, uint32_t neighbours, uint64_t memory, patina_progress *progress)
+{
+    const patina_analysis_desc desc = {.struct_size = sizeof desc, .neighbours = neighbours, .keep_normals = 1};
+    patina_cloud *cloud = NULL;
+    patina_cloud_info info = {.struct_size = sizeof info};
+    int code = patina_cloud_analyse_file(in, &desc, memory, out, progress);
+    if (!code)
+        code = patina_cloud_open(out, &cloud);
+    if (!code)
+        code = patina_cloud_get_info(cloud, &info);
+    const int result = code ? tool_failed(in, cloud, code) : TOOL_OK;
+    for (int i = 0; i < 6 && !code; i++)
+        printf("%-12s %llu\n", tool_kinds[i], (unsigned long long)info.kinds[i]);
+    patina_cloud_destroy(cloud);
+    return result;
+}
+
 int tool_analyse(int count, char **arguments)
 {
     const char *in = NULL, *out = NULL;
     double neighbours = 0;
+    uint64_t memory = 0;
     int grid = 0;
     for (int i = 0; i < count; i++) {
         const char *value = i + 1 < count ? arguments[i + 1] : NULL;
@@ -169,17 +193,26 @@ int tool_analyse(int count, char **arguments)
             if (parse_numbers(value, &neighbours, 1, 1) < 0 || neighbours < 3 || neighbours > 64)
                 return tool_misuse("'%s' is no value for option '--neighbours': 3 to 64", value);
             i++;
+        } else if (!strcmp(arguments[i], "--memory") && value) {
+            if (tool_parse_memory(value, &memory))
+                return tool_misuse("'%s' is no value for option '--memory': as 2G or 500M", value);
+            i++;
         } else {
             return tool_misuse("analyse: '%s' is no option, or lacks its value", arguments[i]);
         }
     }
     if (!in || !out || !*out)
         return tool_misuse("analyse: a file to read, and -o OUT.ply, please");
+    const int whole = ends_in(out, ".cloud");
+    if (whole != ends_in(in, ".cloud") || (whole && grid) || (!whole && memory))
+        return tool_misuse("analyse: of IN.cloud -o OUT.cloud, with --memory and without --grid; of any other file -o OUT.ply");
     patina_progress *progress = NULL;
     struct columns columns = {0};
     const int code = patina_progress_create(&progress);
     tool_cancellable(progress, NULL);
-    const int result = code ? tool_failed(in, NULL, code) : analyse(in, out, (uint32_t)neighbours, grid, progress, &columns);
+    const int result = code    ? tool_failed(in, NULL, code)
+                       : whole ? analyse_cloud(in, out, (uint32_t)neighbours, memory, progress)
+                               : analyse(in, out, (uint32_t)neighbours, grid, progress, &columns);
     tool_cancellable(NULL, NULL);
     tool_drain_log(1);
     patina_progress_destroy(progress);

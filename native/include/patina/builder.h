@@ -13,7 +13,7 @@ extern "C" {
 
 // Builds a file that patina_cloud_open maps, from points that come piece by piece: they are sorted on the disk. The file has the chunks that
 // patina_cloud_create would make, to some digits the same picture; from a million points on it is made in levels, coarse ones first. Where
-// all fits in memory and there is one level, its bytes are those that patina_cloud_save would write. No analysis (patina_cloud_analyse).
+// all fits in memory and there is one level, its bytes are those that patina_cloud_save would write. Not analysed: patina_cloud_analyse_file does it.
 typedef struct patina_builder patina_builder;
 
 typedef struct patina_builder_desc {
@@ -45,6 +45,14 @@ PATINA_API int patina_builder_add_file(patina_builder *builder, const patina_fil
 // one that was there before.
 PATINA_API int patina_builder_end(patina_builder *builder, patina_progress *progress);
 PATINA_API void patina_builder_destroy(patina_builder *builder); // without an end: nothing was built. NULL is fine
+
+// Writes to `to`, which may be `from`, the saved cloud in `from` with what patina_cloud_analyse finds (desc may be NULL): the bytes that
+// opening, analysing and saving it would write. memory: bytes that it takes at most, 16 MiB at least; 0 = a third of what is free. What
+// does not fit (36 bytes a point; with a grid 16 more and 4 a cell) lies on the disk beside `to`, without a name. Beside what memory
+// says: chunks, 0.1 bytes a point, the descriptor's arrays, and with free space up to 100 MB of what stations saw. PATINA_ERROR_FILE
+// where the disk lacks room. After an error, a cancel or a kill there is no file but the one that was there before.
+PATINA_API int patina_cloud_analyse_file(const char *from, const patina_analysis_desc *desc, uint64_t memory, const char *to,
+                                         patina_progress *progress);
 
 #ifdef __cplusplus
 }
