@@ -363,7 +363,7 @@ static void test_full_disk(void **state)
     const uint32_t files = files_left();
     signal(SIGXFSZ, SIG_IGN);
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
-    static const rlim_t limits[] = {100000, 3000000, 8000000};
+    static const rlim_t limits[] = {100000, 3000000, 6000000};
     for (int i = 0; i < 3; i++) {
         less = before;
         less.rlim_cur = limits[i];
