@@ -46,6 +46,12 @@ def folder():
     return Path(sys.modules[MODULE].__file__).resolve().parent
 
 
+def libraries():
+    """Ours that this process has loaded."""
+    with open("/proc/self/maps", encoding="utf-8") as maps:
+        return {str(Path(line.split()[-1]).resolve()) for line in maps if "libpatina" in line}
+
+
 def test_install():
     assert "PATINA_LIBRARY" not in os.environ
     for kind in ("SCRIPTS", "CONFIG", "EXTENSIONS"):
@@ -72,6 +78,13 @@ def test_install():
         inside = Path(os.environ["BLENDER_USER_EXTENSIONS"]).resolve()
         for module in (laspy, lazrs, pye57):
             assert inside in Path(module.__file__).resolve().parents, module.__file__
+
+
+def test_nothing_is_loaded():
+    """The library waits for points: neither the start nor a scene that is set up for it asks for it."""
+    bpy.context.scene.render.engine = "PATINA"
+    bpy.context.view_layer.update()
+    assert not libraries(), libraries()
 
 
 def test_render():
@@ -110,15 +123,13 @@ def test_render():
     share = sum(a > 0.5 for a in alpha) / len(alpha)
     across = (96 * camera.data.lens / camera.data.sensor_width) / math.sqrt(5 * 5 - 1)  # radius of the outline, pixels
     assert abs(share - math.pi * across ** 2 / 96 ** 2) < 0.02, (share, math.pi * across ** 2 / 96 ** 2)
-    with open("/proc/self/maps", encoding="utf-8") as maps:
-        loaded = {line.split()[-1] for line in maps if "libpatina" in line}
     if LEGACY:
         wanted = folder() / "lib/libpatina.so"
     else:  # where Blender unpacks wheels
         import patina_library
         wanted = patina_library.PATH
         assert Path(os.environ["BLENDER_USER_EXTENSIONS"]).resolve() in wanted.resolve().parents and not (folder() / "lib").exists(), wanted
-    assert {str(Path(path).resolve()) for path in loaded} == {str(wanted.resolve())}, (loaded, wanted)
+    assert libraries() == {str(wanted.resolve())}, (libraries(), wanted)
 
 
 def test_remove():
@@ -137,7 +148,7 @@ def test_remove():
 
 def main():
     passed = failed = 0
-    for test in (test_says_what_it_does, test_install, test_render, test_remove):
+    for test in (test_says_what_it_does, test_install, test_nothing_is_loaded, test_render, test_remove):
         try:
             test()
             passed += 1
