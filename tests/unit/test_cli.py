@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line, from outside: test_cli.py PATH_OF_PATINA. Needs Python's own library only."""
+"""The command line, from outside: test_cli.py PATH_OF_PATINA [NAME of a test ...]. Needs Python's own library only. Before the path there may be what
+runs a program of another system: test_cli.py "wine build/out/windows-x64/patina.exe"."""
 import json
 import math
 import os
 import random
 import re
+import shlex
 import signal
 import struct
 import subprocess
@@ -20,12 +22,13 @@ sys.dont_write_bytecode = True
 sys.path.append(str(Path(__file__).resolve().parents[2] / "build"))
 import effects as table  # noqa: E402
 
-PATINA = str(Path(sys.argv[1] if len(sys.argv) > 1 else "build/out/release/patina").resolve())
+*RUNNER, _PROGRAM = shlex.split(sys.argv[1] if len(sys.argv) > 1 else "build/out/release/patina")
+PATINA = [*RUNNER, str(Path(_PROGRAM).resolve())]
 FOLDER = Path()  # a temporary one, set by main
 
 
 def run(*arguments, code=0):
-    done = subprocess.run([PATINA, *map(str, arguments)], capture_output=True, text=True, cwd=FOLDER, timeout=300)
+    done = subprocess.run([*PATINA, *map(str, arguments)], capture_output=True, text=True, cwd=FOLDER, timeout=300)
     assert done.returncode == code, f"{arguments}: exit {done.returncode}, expected {code}: {done.stderr}{done.stdout}"
     return done
 
@@ -718,7 +721,7 @@ def test_planes():
 
 def test_interrupt():
     ball("interrupt.ply")
-    process = subprocess.Popen([PATINA, "render", "interrupt.ply", "--repeat", "100000"], cwd=FOLDER,
+    process = subprocess.Popen([*PATINA, "render", "interrupt.ply", "--repeat", "100000"], cwd=FOLDER,
                                stderr=subprocess.PIPE)
     time.sleep(1)
     process.send_signal(signal.SIGINT)
