@@ -273,13 +273,25 @@ static void run_entry(void **state)
         fail_msg("%s: %s: %d failures", h.label, h.test->name, h.failures);
 }
 
-// key64: OpenGL without 64-bit atomics is an error, for a run that is there to try them.
-static void open_devices(const char *wanted, int key64)
+// Named once or several times; the first, which the others are held against, is always among them.
+static void want(const char *name)
 {
-    int known = !strcmp(wanted, "all");
+    int known = !strcmp(name, "all");
+    slots[0].wanted = 1;
     for (int i = 0; i < CHOICES; i++) {
-        slots[i].wanted = i == 0 || !strcmp(wanted, "all") || !strcmp(wanted, choices[i].name);
-        known |= !strcmp(wanted, choices[i].name);
+        slots[i].wanted |= !strcmp(name, "all") || !strcmp(name, choices[i].name);
+        known |= !strcmp(name, choices[i].name);
+    }
+    if (!known) {
+        fprintf(stderr, "no such device: %s\n", name);
+        exit(2);
+    }
+}
+
+// key64: OpenGL without 64-bit atomics is an error, for a run that is there to try them.
+static void open_devices(int key64)
+{
+    for (int i = 0; i < CHOICES; i++) {
         if (!slots[i].wanted)
             continue;
         patina_device_desc desc = {.struct_size = sizeof desc,
@@ -295,28 +307,25 @@ static void open_devices(const char *wanted, int key64)
             exit(2);
         }
     }
-    if (!known) {
-        fprintf(stderr, "no such device: %s\n", wanted);
-        exit(2);
-    }
 }
 
 int harness_main(int argc, char **argv, const struct harness_case *cases, size_t count)
 {
-    const char *wanted = "all";
     int key64 = 0;
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--device") && i + 1 < argc) {
-            wanted = argv[++i];
+            want(argv[++i]);
         } else if (!strcmp(argv[i], "--key64")) {
             key64 = 1;
         } else {
-            fprintf(stderr, "usage: %s [--device NAME|all] [--key64]\n", argv[0]);
+            fprintf(stderr, "usage: %s [--device NAME|all]... [--key64]\n", argv[0]);
             return 2;
         }
     }
+    if (!slots[0].wanted)
+        want("all");
     setvbuf(stdout, NULL, _IOLBF, 0);
-    open_devices(wanted, key64);
+    open_devices(key64);
     size_t most = count * CHOICES, used = 0;
     struct CMUnitTest *tests = calloc(most + 1, sizeof *tests);
     struct entry *entries = calloc(most + 1, sizeof *entries);
