@@ -14,8 +14,8 @@ struct pt_slots {
 };
 
 // The next range from a chunk on: of at most so many slots, but of one chunk at least, from a multiple of `alignment` on.
-static inline struct pt_slots pt_next_slots(const struct chunk_view *chunks, uint32_t count, uint32_t first_chunk, uint64_t most,
-                                            uint64_t alignment)
+static inline struct pt_slots pt_next_slots(const struct chunk_view *chunks, uint32_t count, uint32_t first_chunk,
+                                            uint64_t most, uint64_t alignment)
 {
     struct pt_slots slots = {.first_chunk = first_chunk};
     uint64_t begin = UINT64_MAX, end = 0;

@@ -137,7 +137,8 @@ int pt_gl_gather_winners(struct pt_gl_device *d, const struct pt_gl_work *work, 
         return result;
     *out = (struct pt_buffer){.size = size, .room = size, .name = d->scratch[use].name};
     d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, out->name);
-    uint8_t *to = d->gl.MapBufferRange(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)size, GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
+    uint8_t *to = d->gl.MapBufferRange(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)size,
+                                       GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
     for (size_t at = 0; to && at < keys->size / 8; at += row) {
         gather(&points, d->host + 2 * at, keys->size / 8 - at < row ? keys->size / 8 - at : row, to + at * points.each);
         look(d);

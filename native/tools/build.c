@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// patina convert IN OUT.cloud: builds the cloud on the disk from windows of the file, and analyses it. Whoever is killed leaves no file of
-// that name but the one that was there before; the next run begins anew.
+// patina convert IN OUT.cloud: builds the cloud on the disk from windows of the file, and analyses it there. Whoever is killed leaves no
+// file of that name but the one that was there before; the next run begins anew.
 #include "tool.h"
 #include "base/pause.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum {
-    WINDOW = 1 << 18,      // points
-    BESIDE = 32 << 20,     // bytes that a window and the program take beside the builder
-    LEAST = 48 << 20,      // that a build takes
-    ANALYSIS_A_POINT = 60, // bytes: 57 were measured of 4 million, 24 of them pages of the file
-    QUIET_MS = 5000        // between two lines that say how far it is
+    WINDOW = 1 << 18,  // points
+    BESIDE = 32 << 20, // bytes that a window and the program take beside the builder
+    LEAST = 48 << 20,  // that a build takes
+    UNKNOWN = 1 << 30, // and where nobody knows what is free
+    QUIET_MS = 5000    // between two lines that say how far it is
 };
 
 // ---- how far it is, on standard error --------------------------------------------------------------------------------
@@ -62,15 +63,14 @@ struct job {
     patina_builder *builder;
     struct tool_stations stations;
     int has_stations;
-    char *place; // where the builder writes: beside the file, where an analysis follows
+    const char *place; // the built cloud: beside the file, where an analysis follows
     uint64_t memory;
 };
 
 static int fail(const struct job *job, const char *what, const void *handle, int code)
 {
-    tool_cancellable(NULL, NULL);
-    tool_drain_log(1);
     (void)job;
+    tool_drain_log(1);
     return tool_failed(what, handle, code);
 }
 
@@ -161,54 +161,54 @@ static int build_cloud(struct job *job)
 
 // ---- its analysis ----------------------------------------------------------------------------------------------------
 
-// Whether the analysis of a cloud is made, and why not.
-static int is_analysed(const struct job *job, const patina_cloud_info *info)
+struct teller {
+    struct report *report;
+    atomic_int done;
+};
+
+static void tell(void *context)
 {
-    const double needed = (double)ANALYSIS_A_POINT * (double)info->drawn;
-    if (job->build->analysis != TOOL_ANALYSED_WHERE_NEEDED || needed <= (double)job->memory)
-        return 1;
-    tool_say("note: written without an analysis, which would take %.1f GB of memory, and may take %.1f: --analysis on makes it",
-             1e-9 * needed, 1e-9 * (double)job->memory);
-    return 0;
+    struct teller *teller = context;
+    while (!atomic_load(&teller->done)) {
+        pt_pause(20);
+        report_look(teller->report);
+    }
 }
 
-static int analyse(struct job *job, patina_cloud *cloud)
+static int analyse(struct job *job)
 {
     patina_analysis_desc desc = {.struct_size = sizeof desc, .keep_normals = 1};
+    struct teller teller = {.report = &job->report};
+    struct pt_thread thread;
     if (job->has_stations)
         tool_describe_stations(&job->stations, &desc);
     desc.free_space = desc.station_count > 1; // one alone sees through nothing
-    patina_task *task = NULL;
     report_begin(&job->report, "analysing the cloud");
-    int code = patina_task_analyse(cloud, &desc, job->progress, &task);
-    if (!code)
-        code = finish(&job->report, task);
-    if (!code)
-        code = patina_task_apply(task);
-    const int result = code ? fail(job, job->build->in, task, code) : TOOL_OK;
-    patina_task_destroy(task);
-    return result;
+    const int told = !pt_thread_start(&thread, tell, &teller, 0); // whoever has no thread for it hears nothing
+    const int code = patina_cloud_analyse_file(job->place, &desc, job->memory, job->build->out, job->progress);
+    atomic_store(&teller.done, 1);
+    if (told)
+        pt_thread_join(&thread);
+    return code ? fail(job, job->build->in, NULL, code) : TOOL_OK;
 }
 
-static int finish_cloud(struct job *job, patina_cloud **cloud)
+static int finish_cloud(struct job *job)
 {
     patina_cloud_info info = {.struct_size = sizeof info};
-    int code = patina_cloud_open(job->place, cloud);
+    patina_cloud *cloud = NULL;
+    int code = patina_cloud_open(job->place, &cloud), result = TOOL_OK;
     if (!code)
-        code = patina_cloud_get_info(*cloud, &info);
-    if (code)
-        return fail(job, job->place, NULL, code);
-    if (info.invalid_positions)
+        code = patina_cloud_get_info(cloud, &info);
+    if (!code && info.invalid_positions)
         tool_say("note: %llu points of %s are nowhere, and are not drawn: a coordinate is no finite number",
                  (unsigned long long)info.invalid_positions, job->build->in);
-    if (is_analysed(job, &info)) {
-        const int result = analyse(job, *cloud);
-        if (result)
-            return result;
-    }
-    tool_cancellable(NULL, NULL);
-    code = patina_cloud_save(*cloud, job->build->out);
-    return code ? fail(job, job->build->out, *cloud, code) : TOOL_OK;
+    const int analysed = job->build->unanalysed || info.has_shapes; // or not to be
+    if (!code && analysed)
+        code = patina_cloud_save(cloud, job->build->out);
+    if (code)
+        result = fail(job, job->place, cloud, code);
+    patina_cloud_destroy(cloud);
+    return result || analysed ? result : analyse(job);
 }
 
 static char *beside(const char *path)
@@ -220,34 +220,44 @@ static char *beside(const char *path)
     return name;
 }
 
-int tool_convert_to_cloud(const struct tool_build *build)
+// A saved cloud needs no building; what is not analysed gets its name at once.
+static int convert(struct job *job)
 {
-    struct job job = {.build = build, .memory = build->memory ? build->memory : pt_free_memory() / 3};
-    patina_cloud *cloud = NULL;
-    const int analysed = build->analysis != TOOL_UNANALYSED;
-    int result = TOOL_OK;
-    job.place = analysed ? beside(build->out) : NULL;
-    if ((analysed && !job.place) || patina_progress_create(&job.progress)) {
-        free(job.place);
+    const struct tool_build *build = job->build;
+    const int built = tool_begins(build->in, "patina\n\x1a", 8);
+    if (built && build->attribute)
+        return tool_misuse("--attribute: a saved cloud has the one that it was made with");
+    char *own = built || build->unanalysed ? NULL : beside(build->out);
+    job->place = built ? build->in : own ? own : build->out;
+    if (!own && !built && !build->unanalysed) {
         tool_say("out of memory");
         return TOOL_FAILED;
     }
-    char *own = job.place;
-    job.place = analysed ? own : (char *)(uintptr_t)build->out;
+    int result = built ? TOOL_OK : build_cloud(job);
+    if (!result && (built || own))
+        result = finish_cloud(job);
+    if (own)
+        pt_file_remove(own);
+    free(own);
+    return result;
+}
+
+int tool_convert_to_cloud(const struct tool_build *build)
+{
+    const uint64_t share = pt_free_memory() / 3;
+    struct job job = {.build = build, .memory = build->memory ? build->memory : share ? share : UNKNOWN};
+    if (patina_progress_create(&job.progress)) {
+        tool_say("out of memory");
+        return TOOL_FAILED;
+    }
     job.report = (struct report){.path = build->in, .progress = job.progress};
     tool_cancellable(job.progress, NULL);
-    result = build_cloud(&job);
-    if (!result && analysed)
-        result = finish_cloud(&job, &cloud);
+    const int result = convert(&job);
     tool_cancellable(NULL, NULL);
     tool_drain_log(1);
-    patina_cloud_destroy(cloud);
-    if (analysed)
-        pt_file_remove(own);
     patina_builder_destroy(job.builder);
     patina_rows_destroy(job.rows);
     tool_free_stations(&job.stations);
     patina_progress_destroy(job.progress);
-    free(own);
     return result;
 }

@@ -53,7 +53,6 @@ static int ends_in(const char *path, const char *ending)
 
 static int parse_options(int count, char **arguments, struct tool_build *build)
 {
-    static const char *const choices[] = {"auto", "on", "off"}; // in the order of tool_analysis
     for (int i = 0; i < count; i += 2) {
         const char *name = arguments[i], *value = i + 1 < count ? arguments[i + 1] : NULL;
         if (strcmp(name, "--attribute") != 0 && strcmp(name, "--memory") != 0 && strcmp(name, "--analysis") != 0)
@@ -66,12 +65,8 @@ static int parse_options(int count, char **arguments, struct tool_build *build)
         } else if (!strcmp(name, "--memory")) {
             bad = tool_parse_memory(value, &build->memory);
         } else {
-            bad = -1;
-            for (uint32_t k = 0; k < 3; k++)
-                if (!strcmp(value, choices[k])) {
-                    build->analysis = k;
-                    bad = 0;
-                }
+            build->unanalysed = !strcmp(value, "off");
+            bad = !build->unanalysed && strcmp(value, "on") != 0;
         }
         if (bad)
             return tool_misuse("%s: '%s' is no value of it", name, value);

@@ -15,7 +15,7 @@ static const char usage_before[] =
     "                                     built on the disk, below a cap of memory, from a million points on in levels\n"
     "  --attribute NAME                   with a scalar of the file, for --ramp\n"
     "  --memory SIZE                      that it takes at most, as 2G or 500M (default: a third of what is free)\n"
-    "  --analysis auto|on|off             auto: where it fits in that memory too\n"
+    "  --analysis on|off                  made on the disk too, within that memory\n"
     "patina analyse FILE -o OUT.ply       normal, spacing, radii, thickness, kind and certainty of every point, as columns\n"
     "  --neighbours K                     3 to 64 (16, and 48 where 16 leave doubts)\n"
     "  --grid                             of scans with rows and columns by the neighbours there, with their true borders\n"

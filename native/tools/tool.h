@@ -154,7 +154,7 @@ int tool_begins(const char *path, const char *bytes, size_t size);
 struct tool_build {
     const char *in, *out, *attribute; // attribute: NULL: none
     uint64_t memory;                  // bytes; 0: automatic
-    uint32_t analysis;                // tool_analysis, but for the grid's
+    int unanalysed;
 };
 int tool_convert_to_cloud(const struct tool_build *build); // a tool_exit
 

@@ -135,8 +135,9 @@ def main():
             wrong = [f"{device}: {key}" for device, one in found.items() for key in first.keys() | one.keys() if one.get(key) != first.get(key)]
             passed, failed = passed + (not wrong), failed + bool(wrong)
             print(f"{'FAILED' if wrong else 'ok'} {first['out.png']} {picture}", *wrong, sep="\n  " if wrong else " ", flush=True)
-    lacks = {"cpu-avx512", "cpu-avx2", "cpu-sse42"} - {level for name, _, level in devices if name == "here"}
-    for level in sorted(lacks) if platform.machine() == "x86_64" else ():
+    x86 = {"cpu-avx512", "cpu-avx2", "cpu-sse42"} if platform.machine() == "x86_64" else set()
+    lacks = x86 - {level for name, _, level in devices if name == "here"}
+    for level in sorted(lacks):
         print(f"skip pictures/{level}: this processor has no such instructions")
     if len(pictures) < len(PICTURES):
         print(f"{len(pictures)} of {len(PICTURES)} pictures: {', '.join(pictures)}")

@@ -144,8 +144,15 @@ def test_convert_to_a_cloud():
         assert (cli.FOLDER / "cloud.png").read_bytes() == (cli.FOLDER / "file.png").read_bytes(), options
     cli.run("render", "out.cloud", "-o", "cloud.png", "--ramp", "heat")
     assert "no attribute 'cold'" in cli.run("convert", "b.ply", "no.cloud", "--attribute", "cold", code=1).stderr
-    assert "built without" not in cli.run("convert", "b.ply", "out.cloud", "--memory", "1M").stderr
-    for bad in (["--memory", "x"], ["--analysis", "grid"], ["--memory"], ["--colour", "1"]):
+    assert not cli.run("convert", "b.ply", "out.cloud", "--memory", "1M").stderr
+    wanted = (cli.FOLDER / "out.cloud").read_bytes()
+    cli.run("convert", "b.ply", "bare.cloud", "--analysis", "off")
+    cli.run("convert", "bare.cloud", "again.cloud")
+    assert (cli.FOLDER / "again.cloud").read_bytes() == wanted, "a saved cloud is analysed"
+    cli.run("convert", "out.cloud", "again.cloud")
+    assert (cli.FOLDER / "again.cloud").read_bytes() == wanted, "an analysed cloud stays as it is"
+    assert "a saved cloud" in cli.run("convert", "bare.cloud", "no.cloud", "--attribute", "heat", code=2).stderr
+    for bad in (["--memory", "x"], ["--analysis", "grid"], ["--analysis", "auto"], ["--memory"], ["--colour", "1"]):
         cli.run("convert", "b.ply", "no.cloud", *bad, code=2)
     assert "goes into a .cloud" in cli.run("convert", "b.ply", "no.ply", "--memory", "1G", code=2).stderr
     assert not (cli.FOLDER / "no.cloud").exists() and not (cli.FOLDER / "no.ply").exists()
@@ -183,7 +190,7 @@ def test_convert_is_killed():
     takes, wanted = time.monotonic() - begin, out.read_bytes()
     out.write_bytes(b"before")
     for i in range(8):
-        process = subprocess.Popen([cli.PATINA, "convert", "long.ply", "out.cloud"], cwd=cli.FOLDER, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen([*cli.PATINA, "convert", "long.ply", "out.cloud"], cwd=cli.FOLDER, stderr=subprocess.DEVNULL)
         time.sleep(takes * (i + 0.5) / 8)
         process.kill()
         process.wait()
