@@ -234,10 +234,11 @@ static int convert(struct job *job)
         return TOOL_FAILED;
     }
     int result = built ? TOOL_OK : build_cloud(job);
-    if (!result && (built || own))
+    if (!result && (built || own)) {
         result = finish_cloud(job);
-    if (own)
-        pt_file_remove(own);
+        if (own)
+            pt_file_remove(own);
+    }
     free(own);
     return result;
 }

@@ -174,6 +174,10 @@ def test_convert_bad_files():
                                          "end_header\n1 2 3\n4 five 6\n7 8 9\n")
     assert "line 9: 'five' is not a number" in cli.run("convert", "word.ply", "out.cloud", code=1).stderr
     assert out.read_bytes() == before
+    (cli.FOLDER / "signed.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                                           "property char red\nproperty char green\nproperty char blue\nend_header\n"
+                                           "1 2 3 200 -1 7\n4 5 6 128 0 255\n7 8 9 1 2 3\n")
+    cli.run("convert", "signed.ply", "signed.cloud")  # bytes that a writer called signed
     nowhere = binary("nan.ply", 5000, row=lambda i: (i % 50, i // 50, float("nan") if i % 100 == 3 else 0.0))
     assert "50 points of nan.ply are nowhere" in cli.run("convert", nowhere, "out.cloud").stderr
     assert "warning: more.ply: 7 bytes follow behind" in cli.run("convert", binary("more.ply", 5000, end=b"1234567"), "out.cloud").stderr
