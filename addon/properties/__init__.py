@@ -280,7 +280,7 @@ class PatinaObjectProperties(PropertyGroup):
         description="Points that are far from what their neighbors are part of are not drawn and cast no shadow")
     hide_uncolored: BoolProperty(
         name="Uncolored", override=_OVERRIDE, default=False,
-        description="Of points with colors, those that are quite black or have none are left out")
+        description="Of points with colors, those that are quite black or have none are left out; of a cloud that is black everywhere nobody")
     hide_unclassified: BoolProperty(
         name="Unclassified", override=_OVERRIDE, default=False,
         description="Points of the classes 0, never classified, and 1, unassigned, are not drawn and cast no shadow")

@@ -131,12 +131,23 @@ def opacities(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     return None if values is None else np.ascontiguousarray(values[:, -1:])
 
 
-def without_uncolored(values: np.ndarray | None, rgb: np.ndarray | None) -> np.ndarray | None:
-    """Opacities that leave out points without a color: black as nothing else in a photograph, or no number."""
-    if rgb is None:
-        return values
-    colored = ((rgb[:, :3] > 0).any(axis=1) & ~np.isnan(rgb[:, :3]).any(axis=1)).astype(np.float32).reshape(-1, 1)
-    return colored if values is None else values * colored
+def colored(rgb: np.ndarray) -> np.ndarray:
+    """(count,) bool: whose color is a number, and not black as nothing else in a photograph."""
+    return (rgb[:, :3] > 0).any(axis=1) & ~np.isnan(rgb[:, :3]).any(axis=1)
+
+
+def without_uncolored(values: np.ndarray | None, rgb: np.ndarray | None) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Opacities that leave out points without a color, and the colors. Where no point has one, nobody is left out: the cloud has no colors."""
+    has = None if rgb is None else colored(rgb)
+    if has is None or not has.any():
+        return values, None
+    return only(values, has), rgb
+
+
+def only(values: np.ndarray | None, shown: np.ndarray) -> np.ndarray:
+    """(count, 1) float32 opacities that leave out all others."""
+    column = shown.astype(np.float32).reshape(-1, 1)
+    return column if values is None else values * column
 
 
 def scalars(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:

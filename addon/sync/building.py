@@ -33,26 +33,28 @@ def fits_in_memory(count: int) -> bool:
 
 
 def steps(pieces: importers.Pieces, place: Path, scalar: str, offset: Corner, hide_uncolored: bool, progress: importers.Progress,
-          parts: int) -> jobs.Steps[Scans | None]:
+          parts: int, colors: bool = True) -> jobs.Steps[Scans | None]:
     """Builds the cloud's file, and beside it which scans its points are of, which it gives. offset: added to the pieces' positions.
     The first two of so many parts of the progress. PatinaError where the disk lacks room, too."""
     wanted = [own - shift for own, shift in zip(pieces.origin, offset, strict=True)]  # origin of what is built
     box = tuple(tuple(value - start for value, start in zip(corner, wanted, strict=True)) for corner in pieces.box)
     reading = progress.part(0, parts)
-    shown = not hide_uncolored
+    shown = not hide_uncolored or not colors
     with _Scans(place) as scans, \
             Builder(place, preferences.cloud_bytes(), pieces.count, box, narrow=pieces.narrow) as builder:
         for piece in pieces.each(reading):
             if piece is not None:
                 opacity, radius = (column(piece, name) if piece.splats else None for name in ("opacity", "radius"))
-                opacities = attributes.without_uncolored(opacity, piece.colors) if hide_uncolored else opacity
-                shown = shown or bool(opacities is None or opacities.any())
-                builder.add(piece.positions, piece.normals, piece.colors, opacities, radius, column(piece, scalar), classes(piece), offset)
+                rgb = piece.colors if colors else None
+                has = attributes.colored(rgb) if hide_uncolored and rgb is not None else None
+                shown = shown or has is None or bool(has.any())
+                opacity = opacity if has is None else attributes.only(opacity, has)
+                builder.add(piece.positions, piece.normals, rgb, opacity, radius, column(piece, scalar), classes(piece), offset)
                 scans.add(piece.scalars)
             yield jobs.Pause()
         if not shown:  # colors that are black everywhere are none, and hide nobody
             builder.close()
-            return (yield from steps(pieces, place, scalar, offset, False, progress, parts))
+            return (yield from steps(pieces, place, scalar, offset, hide_uncolored, progress, parts, colors=False))
         writing = progress.part(1, parts)
         writing.doing = f"Building {pieces.count:,} points on the disk"
         with writing.inner() as inner:

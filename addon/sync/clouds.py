@@ -623,7 +623,7 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     if softened and by is None:
         notices.append(f"'{obj.name}' has no point attribute '{softened}' to be soft by")
     if obj.patina.hide_uncolored:
-        opacities = attributes.without_uncolored(opacities, rgb)
+        opacities, rgb = attributes.without_uncolored(opacities, rgb)
     analyzed = analysis.wanted(obj)
     stations = analysis.stations(obj, data, count, analyzed == 2) if analyzed else None
     if analyzed == 2 and not (stations and stations.by_grid):

@@ -191,9 +191,9 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
     units, told = points.notes.get("units"), points.notes.get(scans_of_files.NOTE, "")
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
-    opacities = attributes.without_uncolored(discs[0], points.colors) if source.hide_uncolored else discs[0]
+    opacities, rgb = attributes.without_uncolored(discs[0], points.colors) if source.hide_uncolored else (discs[0], points.colors)
     with progress.part(1, parts).inner() as inner:
-        task = native.Cloud.start(points.positions, points.normals, points.colors, opacities, inner, discs[1], origin=offset,
+        task = native.Cloud.start(points.positions, points.normals, rgb, opacities, inner, discs[1], origin=offset,
                                   scalars=building.column(points, source.scalar), classes=building.classes(points))
     yield task
     cloud = task.result()

@@ -451,6 +451,20 @@ def test_hidden_points():
     check((shown()[1] == everything).all(), "all again")
 
 
+def test_black_everywhere():
+    """A cloud of black points alone is one without colors where uncolored ones are left out."""
+    fresh_scene(160, 120)
+    add_light('SUN', 3.0)
+    ball = sphere(4000)[0]
+    bare = add_points(ball)
+    wanted = render()["Combined"]
+    bare.hide_render = True
+    obj = add_points(ball, np.full((len(ball), 4), (0, 0, 0, 255), np.uint8))
+    check(not np.array_equal(render()["Combined"], wanted), "black ones look as those without colors")
+    obj.patina.hide_uncolored = True
+    check(np.array_equal(render()["Combined"], wanted) and (wanted[..., 3] > 0).any(), "not as without colors")
+
+
 def test_uncolored_of_a_link():
     fresh_scene(160, 120)
     obj, = import_ply(dense("uncolored.ply"), link=True)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Linked clouds of large files are built on the disk, and are what they are where they are built in memory."""
 
+import contextlib
 import re
 import subprocess
 import sys
@@ -163,21 +164,25 @@ FACE = "element face 1\nproperty list uchar int vertex_indices\n"
 
 
 def test_same_ply():
-    """The same of PLYs: colors of bytes, of 16 bits, black ones; classes and scalars; splats; one whose faces give it normals, which is read whole."""
+    """The same of PLYs: colors of bytes, of 16 bits, black ones; classes and scalars; splats; faces behind normals; one whose faces give it
+    normals, which is read whole."""
     whole = ply_file("large.ply", (*PLACE, *BYTES, *NORMALS, ("classification", "u1"), ("scan", "u1"), ("heat", "f4")))
     for what, wanted in ((whole, {"scalar": "heat"}), (whole, {"origin": (499999.0, 5000001.0, 90.0), "analyzed": False}),
                          (ply_file("large_wide.ply", (*PLACE, *WIDE)), {}),
                          (ply_file("large_black.ply", (*PLACE, *BYTES, *NORMALS), red=0, green=0, blue=0, nx=0, ny=0, nz=0), {"analyzed": False}),
+                         (SCRATCH / "large_black.ply", {"hide_uncolored": True}),
                          (ply_file("large_hidden.ply", (*PLACE, *BYTES), red=0, green=0), {"hide_uncolored": True}),
+                         (ply_file("large_uncolored.ply", PLACE), {"hide_uncolored": True}),
+                         (ply_file("large_mesh.ply", (*PLACE, *NORMALS), behind=FACE), {"analyzed": False}),
                          (ply_file("large_splats.ply", (*PLACE, *SPLATS)), {"scalar": "opacity"}),
                          (ply_file("large_splats2.ply", (*PLACE, *SPLATS)), {"hide_uncolored": True}),
                          (ply_file("large_faces.ply", PLACE, behind=FACE), {})):
+        check((in_pieces(what, LEAST) is None) == (what.name == "large_faces.ply"), f"{what.name}: not read as it should be")
         in_memory, pieces = both(what, **wanted)
         for ending in in_memory:
             check(in_memory[ending] == pieces[ending], f"{what.name} {wanted}: {ending} differs")
-    check(in_pieces(whole, LEAST) is not None, "a large PLY is read whole")
-    check(in_pieces(SCRATCH / "large_faces.ply", LEAST) is None, "faces in pieces")
     check(in_pieces(whole, 60000) is None, "a small PLY in pieces")
+    shown_uncolored(SCRATCH / "large_black.ply")
 
 
 def scanned(count, seed, **more):
@@ -191,6 +196,16 @@ def scanned(count, seed, **more):
     found["intensity"] = ("float", (), rng.uniform(0, 1, count))
     found["classification"] = ("integer", (0, 255), rng.integers(1, 7, count))
     return found | more
+
+
+def shown_uncolored(path):
+    """Both ways: where all points are black, Hide Uncolored shows them as those of a cloud without colors."""
+    source = linked.source(path, hide_uncolored=True)
+    for large in (False, True):
+        forget(source)
+        with Small() if large else contextlib.nullcontext():
+            cloud = linked.load(source).cloud
+        check(cloud.drawn > 20000 and not cloud.has_colors and not cloud.has_opacities, f"{path.name}: {cloud.drawn} points, colors {cloud.has_colors}")
 
 
 def test_same_e57():
