@@ -47,7 +47,7 @@ def steps(path: Path, least: int, names: Collection[str], progress: Progress) ->
     origin = origin_of(lower, upper, 1e-4)
     wanted = frozenset(names)
     return Pieces(total, origin, (tuple(lower.tolist()), tuple(upper.tolist())), notes,
-                  lambda reading: _told(path, _each(path, poses, origin, wanted, notes, reading)))
+                  lambda reading: _told(path, _each(path, poses, origin, wanted, notes, reading)), zeros=True)
 
 
 def _comes_in_pieces(header: Any) -> bool:

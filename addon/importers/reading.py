@@ -84,7 +84,8 @@ class Pieces:
     box: tuple[tuple[float, float, float], tuple[float, float, float]]  # file coordinates, as far as known
     notes: dict[str, str | float | list[float]]
     each: Callable[[Progress], Iterator[PointFile | None]]  # all with the same arrays, relative to origin; colors rather (n, 3) uint16. None: a pause
-    narrow: bool = True  # colors of 16 bits may become bytes, and what is zero everywhere is none
+    narrow: bool = True  # colors of 16 bits may become bytes
+    zeros: bool = False  # what is zero everywhere stays; else, where colors may become bytes, it is none
 
 
 class Progress:

@@ -16,22 +16,22 @@ Corner = tuple[float, float, float]
 
 class Builder(_Handle):
     """Writes a file that Cloud.open maps. memory: bytes that it takes at most, 0: a third of what is free; count and box of all points,
-    as far as known. narrow: what add() says of it. Nothing of it is left where it is closed before its end."""
+    as far as known. narrow: what add() says of it; zeros: whether what is zero everywhere stays. Nothing of it is left where it is closed before its end."""
 
     _kind = "builder"
 
     def __init__(self, path: Path, memory: int = 0, count: int = 0, box: tuple[Corner, Corner] | None = None, threads: int = 0,
-                 narrow: bool = True) -> None:
+                 narrow: bool = True, zeros: bool = False) -> None:
         lower, upper = box or ((0.0,) * 3, (0.0,) * 3)
         self._desc = abi.BuilderDesc(memory=memory, count=count, box_min=(c_double * 3)(*lower), box_max=(c_double * 3)(*upper),
-                                     threads=threads, narrow_colors=int(narrow))
+                                     threads=threads, narrow_colors=(2 if zeros else 1) if narrow else 0)
         super().__init__(os.fsencode(path), byref(self._desc), create="patina_builder_begin")
 
     def add(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
             opacities: np.ndarray | None = None, radii: np.ndarray | None = None, scalars: np.ndarray | None = None,
             classes: np.ndarray | None = None, origin: Corner = (0.0,) * 3) -> None:
-        """The next points, as Cloud takes them; what the first piece has, all have. Narrow: colors of 16 bits that 8 hold become bytes;
-        normals, colors, scalars and classes that are zero everywhere are none."""
+        """The next points, as Cloud takes them; what the first piece has, all have. Narrow: colors of 16 bits that 8 hold become bytes, and
+        normals, colors, scalars and classes that are zero everywhere are none, unless zeros stay."""
         self._call("add", byref(_describe(positions, normals, colors, opacities, radii, scalars, classes, 0, origin)))
 
     def start_end(self, progress: Progress | None = None) -> Task:

@@ -41,7 +41,7 @@ def steps(pieces: importers.Pieces, place: Path, scalar: str, offset: Corner, hi
     reading = progress.part(0, parts)
     shown = not hide_uncolored or not colors
     with _Scans(place) as scans, \
-            Builder(place, preferences.cloud_bytes(), pieces.count, box, narrow=pieces.narrow) as builder:
+            Builder(place, preferences.cloud_bytes(), pieces.count, box, narrow=pieces.narrow, zeros=pieces.zeros) as builder:
         for piece in pieces.each(reading):
             if piece is not None:
                 opacity, radius = (column(piece, name) if piece.splats else None for name in ("opacity", "radius"))

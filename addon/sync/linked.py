@@ -304,11 +304,10 @@ def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: 
 
 
 def _scan_of(found: Linked) -> np.ndarray | None:
-    """The scan of each point, where that is written beside the cloud and a scanner is known for it."""
-    if found.scans is None or not found.scanners:
-        return None
-    numbers = np.array(found.scans.numbers, np.uint16)
-    return numbers[np.fromfile(found.cloud.scan_file, np.uint16)]
+    """The scan of each point, where scanners are known: the scans that a file tells of follow each other, and a file beside the cloud, which
+    only several scans have, is not asked."""
+    counts = [scan.count for scan in scans_of_files.unpacked(found.told)] if found.scanners else []
+    return np.repeat(np.arange(len(counts), dtype=np.min_scalar_type(len(counts))), counts) if sum(counts) == found.cloud.count else None
 
 
 def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:

@@ -441,7 +441,7 @@ static int end_build(struct finish *finish)
     for (int i = 0; i < PT_BUILDER_BUCKETS; i++)
         if (pt_tape_rest(&builder->spill, &builder->buckets[i].tape))
             return pt_builder_fail(builder, builder->spill.error);
-    if (builder->desc.narrow_colors)
+    if (builder->desc.narrow_colors == 1)
         leave_out_zeros(builder);
     patina_cloud_desc desc;
     const int narrow = narrow_shift(builder) >= 0;

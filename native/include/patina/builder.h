@@ -28,7 +28,7 @@ typedef struct patina_builder_desc {
     uint32_t threads; // 0 = one per core
     uint32_t
         narrow_colors; // 1 = UINT16 colours that 8 bits hold (all up to 255; or all low bytes zero; or all as their high bytes) become bytes,
-    // and normals, colours, scalars and classes that are zero at all points are left out, as if no piece had them
+    // and normals, colours, scalars and classes that are zero at all points are left out, as if no piece had them; 2 = bytes alone: zeros stay
 } patina_builder_desc;
 
 // The file gets its name at the end, whole or not at all. Beside it lies, without a name, what is sorted: about 40 bytes a point and once
