@@ -14,6 +14,7 @@ from . import scans
 from .reading import ZERO, Filter, Pieces, PointFile, Progress, scanners_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
+MOST_LISTS = 1 << 23  # rows with lists that are gone through at one go, which takes some 0.1 s
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
@@ -48,23 +49,25 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             splats=file.splats).filtered(wanted)
 
 
-def in_pieces(path: Path, least: int, names: Collection[str], _progress: Progress) -> jobs.Steps[Pieces | None]:
+def in_pieces(path: Path, least: int, names: Collection[str], progress: Progress) -> jobs.Steps[Pieces | None]:
     """The points of a binary PLY piece by piece, with those of their scalars that are named; None where there are not more than least, where
-    the library reads the file whole, and of a text, all of which would have to be looked through to know the first thing of it."""
+    the library reads the file whole, of a text, all of which would have to be looked through to know the first thing of it, and of many lists."""
     yield from ()
     try:
         with open(path, "rb") as file:
-            head = file.read(4096)
+            head = file.read(65536)
     except OSError:
         return None  # whoever reads it whole says what is wrong
-    if not head.startswith(b"ply") or b"format binary" not in head or path.stat().st_size < least:
+    if not head.startswith(b"ply") or b"format binary" not in head or path.stat().st_size < least or _lists(head) > MOST_LISTS:
         return None
     try:
-        with Rows(path) as rows:
+        with progress.inner() as inner, Rows(path, inner) as rows:
             if rows.whole or rows.count <= least:
                 return None
             count = rows.count
             origin = next((window.origin for window in rows.windows(1)), ZERO)
+    except native.PatinaCancelled:
+        raise
     except native.PatinaError:
         return None
     wanted = frozenset(names)
@@ -73,7 +76,7 @@ def in_pieces(path: Path, least: int, names: Collection[str], _progress: Progres
 
 def _each(path: Path, names: frozenset[str], progress: Progress) -> Iterator[PointFile]:
     done = 0
-    with Rows(path) as rows:
+    with progress.inner() as inner, Rows(path, inner) as rows:
         for window in rows.windows(SMALL_PIECE):
             progress.step(done / rows.count)
             done += window.count
@@ -81,6 +84,19 @@ def _each(path: Path, names: frozenset[str], progress: Progress) -> Iterator[Poi
             scalars = {name: window.attribute(index) for index, name in enumerate(window.attributes) if name in kept}
             yield PointFile(path.stem, window.positions(), window.normals(), window.colors(), scalars, window.origin,
                             window.invalid_positions, splats=window.splats)
+
+
+def _lists(head: bytes) -> int:
+    """Rows of a PLY that have lists: where one ends is known when it has been looked at. Those before the points are gone through when the
+    file is opened, those behind them with the last window."""
+    rows, total = 0, 0
+    for line in head.split(b"end_header")[0].splitlines():
+        words = line.split()
+        if words[:1] == [b"element"]:
+            rows = int(words[2]) if len(words) == 3 and words[2].isdigit() else 0
+        elif words[:2] == [b"property", b"list"]:
+            total, rows = total + rows, 0
+    return total
 
 
 def preview(path: Path) -> list[str]:

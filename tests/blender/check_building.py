@@ -199,6 +199,32 @@ def test_same_ply():
     shown_uncolored(SCRATCH / "large_black.ply")
 
 
+def test_many_lists():
+    """A PLY with many rows of lists, which would have to be gone through at one go, is read whole, wherever they lie; opening and reading
+    follow the progress, and end with it."""
+    path, most = ply_file("large_lists.ply", (*PLACE, *NORMALS), behind=FACE), library.MOST_LISTS
+    library.MOST_LISTS = 0
+    try:
+        check(in_pieces(path, LEAST) is None, "many lists in pieces")
+        check(in_pieces(ply_file("large_rows.ply", PLACE, behind="element camera 3\nproperty float x\n"), LEAST) is not None, "rows without lists")
+    finally:
+        library.MOST_LISTS = most
+    for at in (0, 1):
+        progress, ended = importers.Progress(), False
+        try:
+            if at == 0:
+                progress.cancel()
+            pieces, reading = jobs.finish(importers.in_pieces(path, LEAST, (), progress)), progress.part(0, 1)
+            with Small():
+                each = pieces.each(reading)
+                next(each)
+                reading._native.cancel()  # as one does who does not look between pieces
+                next(each)
+        except native.PatinaCancelled:
+            ended = True
+        check(ended, f"not cancelled {('at the opening', 'between windows')[at]}")
+
+
 def scanned(count, seed, **more):
     """A wavy ground in a scan of an E57 (check_formats.e57_file)."""
     rng = np.random.default_rng(seed)
