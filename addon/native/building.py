@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Saved clouds of more points than memory holds: built on the disk, from pieces."""
+"""Saved clouds of more points than memory holds: built on the disk, from pieces, and analyzed there."""
 
 from __future__ import annotations
 
 import os
 from ctypes import byref, c_double
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from . import Progress, Task, _describe, _Handle, _handle_of, abi
+from . import Cloud, Progress, Task, _describe, _Handle, _handle_of, abi
 
 Corner = tuple[float, float, float]
 
@@ -37,3 +38,10 @@ class Builder(_Handle):
     def start_end(self, progress: Progress | None = None) -> Task:
         """A task that writes the file: once, and then nothing may be added."""
         return Task("end_build", self._handle, _handle_of(progress), keep=(self, progress))
+
+
+def start_analysis(cloud: Cloud, path: Path, to: Path, memory: int = 0, progress: Progress | None = None, **given: Any) -> Task:
+    """A task that writes the saved cloud in path, which cloud maps and which stays, with what an analysis finds, to another file: whole or not at
+    all. memory: bytes that it takes at most, 0: a third of what is free. given: as Cloud.analyse."""
+    described, kept = cloud._describe_analysis(**given)
+    return Task("analyse_file", os.fsencode(path), byref(described), memory, os.fsencode(to), _handle_of(progress), keep=(*kept, progress))

@@ -14,9 +14,13 @@ import time
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-from .. import jobs, native
-from .analysis import Stations
+from .. import jobs, native, preferences
+from ..importers import Progress
+from ..native import building
+from .analysis import Stations, label
 
 # Half the cores, so that the view stays quick meanwhile.
 BESIDE = max(1, (os.cpu_count() or 2) // 2)
@@ -190,11 +194,31 @@ class Analyses:
 
 
 def start(cloud: native.Cloud, stations: Stations | None, progress: native.Progress, threads: int = 0) -> native.Task:
+    return cloud.start_analysis(progress=progress, threads=threads, **_given(stations))
+
+
+def on_disk(cloud: native.Cloud, stations: Stations | None, path: Path, to: Path, progress: Progress) -> jobs.Steps[None]:
+    """Analyzes the saved cloud in path, which cloud maps, to another file: with the memory that pictures may hold of linked clouds."""
+    progress.doing = f"{label(cloud)} on the disk"
+    with progress.inner() as inner:
+        task = building.start_analysis(cloud, path, to, preferences.cloud_bytes(), inner, **_given(stations))
+    try:
+        yield task
+        task.result()
+    except GeneratorExit:  # nobody wants it any more
+        inner.cancel()
+        raise
+    finally:
+        task.close()
+
+
+def _given(stations: Stations | None) -> dict[str, Any]:
+    """As the library's calls take it."""
     if stations is None:
-        return cloud.start_analysis(progress=progress, threads=threads)
-    return cloud.start_analysis(stations=stations.places if len(stations.places) else None, station=stations.of_points,
-                                progress=progress, threads=threads, free_space=stations.tells_free_space, grid=stations.grid,
-                                by_grid=stations.by_grid, scan=stations.scan, directions=stations.directions)
+        return {}
+    return {"stations": stations.places if len(stations.places) else None, "station": stations.of_points,
+            "free_space": stations.tells_free_space, "grid": stations.grid, "by_grid": stations.by_grid, "scan": stations.scan,
+            "directions": stations.directions}
 
 
 def _closed(task: native.Task) -> bool:

@@ -278,24 +278,30 @@ def _bare(wanted: Source) -> Source:
 
 
 def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: importers.Progress) -> jobs.Steps[Linked]:
-    """Analyzes what was built, and keeps it; lets the cloud without go where nobody else asked for it."""
-    progress.doing = analysis.label(found.cloud)
+    """Analyzes what was built, on the disk too; lets the cloud without go where nobody else asked for it."""
     units = None if found.units == (1.0, 1.0) else list(found.units)
     notes = (found.origin, found.scanners, units, found.scans, found.told)
     if found.scans:  # at once: another Blender may let the cloud without go
         found.cloud.scan_file = shutil.copyfile(found.cloud.scan_file, source.kept.with_suffix(SCAN_ENDING))
-    with progress.inner() as inner:
-        task = analyzing.start(found.cloud, analysis.of_columns(found.scanners, _scan_of(found)), inner)
-    yield task
-    task.result()
+    stations = analysis.of_columns(found.scanners, _scan_of(found))
     try:
-        task = found.cloud.start_save(source.kept)
-        yield task
-        task.result()
+        yield from analyzing.on_disk(found.cloud, stations, bare.kept, source.kept, progress)
         _write_notes(source.kept, *notes)
         known = _linked(native.Cloud.open(source.kept), *notes[:3], found.scans and asdict(found.scans), found.told, source.kept)
-    except (native.PatinaError, OSError):
-        return found  # no room on the disk: what the analysis found stays in memory
+    except (native.PatinaError, OSError) as error:
+        if getattr(error, "code", native.FILE) != native.FILE:
+            raise
+        known = _opened(source)
+        if known:  # another Blender has made it meanwhile, and let what was built go
+            return known
+        if not building.fits_in_memory(found.cloud.count):
+            raise
+        progress.doing = analysis.label(found.cloud)  # no room on the disk: what is found stays in memory
+        with progress.inner() as inner:
+            task = analyzing.start(found.cloud, stations, inner)
+        yield task
+        task.result()
+        return found
     if made:
         found.cloud.close()
         _let_go(bare.kept)

@@ -29,11 +29,12 @@ struct patina_task {
     patina_cloud *painted; // the caller's
     uint32_t page;
     patina_cloud *cloud; // built, until it is taken
-    char *path;          // its own copy
+    char *path, *to;     // its own copies
     patina_builder *builder;
     const patina_cloud *saved;
     patina_file *file; // opened, until it is taken
     patina_analysis_desc analyse;
+    uint64_t memory;
     struct pt_analysis analysis; // computed, until it is applied
     patina_grid_desc grid;
     float *normals;
@@ -104,6 +105,11 @@ static int verify(struct patina_task *task) { return patina_cloud_verify(task->p
 static int analyse(struct patina_task *task)
 {
     return pt_analysis_compute(task->painted, &task->analyse, NULL, task->progress, &task->analysis);
+}
+
+static int analyse_file(struct patina_task *task)
+{
+    return patina_cloud_analyse_file(task->path, &task->analyse, task->memory, task->to, task->progress);
 }
 
 static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&task->desc, task->fingerprint); }
@@ -225,6 +231,24 @@ int patina_task_end_build(patina_builder *builder, patina_progress *progress, pa
     return start(&task, out);
 }
 
+int patina_task_analyse_file(const char *from, const patina_analysis_desc *desc, uint64_t memory, const char *to,
+                             patina_progress *progress, patina_task **out)
+{
+    struct patina_task task = {.work = analyse_file, .memory = memory, .progress = progress};
+    int error = pt_take(NULL, "patina_task_analyse_file", desc, &task.analyse, sizeof task.analyse);
+    if (error)
+        return error;
+    if (!to)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_analyse_file: to is NULL");
+    task.to = pt_copy_text(to, strlen(to));
+    if (!task.to)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "a task: out of memory");
+    error = start_at(&task, from, out);
+    if (error)
+        free(task.to);
+    return error;
+}
+
 int patina_task_verify(const char *path, patina_progress *progress, patina_task **out)
 {
     return start_at(&(struct patina_task){.work = verify, .progress = progress}, path, out);
@@ -275,6 +299,7 @@ void patina_task_destroy(patina_task *task)
     patina_file_destroy(task->file);
     pt_analysis_free(&task->analysis);
     free(task->path);
+    free(task->to);
     pt_handle_destroy(&task->handle);
     free(task);
 }

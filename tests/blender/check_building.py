@@ -4,6 +4,7 @@
 import contextlib
 import json
 import math
+import signal
 import subprocess
 import sys
 import time
@@ -14,8 +15,9 @@ import numpy as np
 from check_formats import e57_file
 from check_import import import_ply
 from harness import SCRATCH, Skip, check, new_scene, render
-from patina import importers, jobs, memory, native
+from patina import importers, jobs, memory, native, preferences
 from patina.importers import e57, las, library
+from patina.native import building as disk
 from patina.sync import building, linked
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
@@ -364,6 +366,138 @@ def test_cancelled_and_cut():
         check(linked.load(source).cloud.count == 60000, "the next time it is read")
 
 
+class OnDisk:
+    """Within: whoever analyzes in memory fails; told are the caps of what is analyzed on the disk, whose cap is this."""
+
+    def __init__(self, memory=0):
+        self.memory, self.told = memory, []
+
+    def __enter__(self):
+        self.kept = native.Cloud.start_analysis, native.Cloud.analyse, disk.start_analysis, preferences.cloud_bytes
+        native.Cloud.start_analysis = native.Cloud.analyse = lambda *_arguments, **_more: check(False, "analyzed in memory")
+        disk.start_analysis, preferences.cloud_bytes = self._start, lambda: self.memory
+        return self.told
+
+    def _start(self, cloud, path, to, memory, progress, **given):
+        self.told.append((memory, path.name, to.name, sorted(name for name, value in given.items() if value is not None and value is not False)))
+        return self.kept[2](cloud, path, to, memory, progress, **given)
+
+    def __exit__(self, *_):
+        native.Cloud.start_analysis, native.Cloud.analyse, disk.start_analysis, preferences.cloud_bytes = self.kept
+
+
+def without_head(place):
+    """A cloud's file without what its head says of memory, and the check sum of that."""
+    data = bytearray(place.read_bytes())
+    data[128:136] = data[504:512] = bytes(8)
+    return bytes(data)
+
+
+def test_analyzed_on_the_disk():
+    """What was built on the disk is analyzed there, below the cap, to the same bytes, with the scanners of its file; what it says meanwhile;
+    smaller files are analyzed in memory."""
+    count, cap = 300000, 1 << 24
+    path = scan_file("large_disk.las", count)
+    source, bare = linked.source(path), linked.source(path, analyzed=False)
+    with Small():
+        linked.load(bare)
+    check(bare.kept.stat().st_size + 36 * count > cap, "all of it fits")
+    cloud = native.Cloud.open(bare.kept)
+    cloud.analyse()
+    cloud.start_save(SCRATCH / "wanted").result()
+    progress, seen = importers.Progress(), []
+    with Small(), OnDisk(cap) as told:
+        steps = linked.steps(source, progress)
+        while True:
+            try:
+                task = next(steps)
+            except StopIteration as end:
+                cloud = end.value.cloud
+                break
+            while not task.done():
+                seen.append((progress.doing, progress.value()))
+                time.sleep(0.002)
+    check(told == [(cap, bare.kept.name, source.kept.name, [])], f"{told}")
+    check(cloud.has_shapes and cloud.bytes < 4 * count, f"{cloud.bytes} bytes of {count} points are in memory")
+    check(source.kept.read_bytes() == (SCRATCH / "wanted").read_bytes() and bare.kept.exists(), "other bytes")
+    values = [value for doing, value in seen if doing == "Analyzing 300,000 points on the disk"]
+    check(values and values == sorted(values) and 2 / 3 <= values[0] < values[-1] <= 1.0, f"{values}")
+    scans = [scanned(20000, seed, pose=((1.0, 0.0, 0.0, 0.0), (x, 0.0, 3.0))) for seed, x in ((1, 2.0), (2, -2.0))]
+    path = e57_file("large_disk.e57", *scans)
+    whole, _ = both(path)
+    forget(linked.source(path))
+    with Small(), OnDisk() as told:
+        linked.load(linked.source(path))
+    check(len(told) == 1 and {"station", "stations", "free_space"} <= set(told[0][3]), f"{told}")
+    check(without_head(linked.source(path).kept) == whole[".cloud"], "other bytes with stations")
+    check(not linked.source(path, analyzed=False).kept.exists(), "the cloud without an analysis stays")
+    small = linked.source(scan_file("large_not.las", 20000))
+    try:
+        with OnDisk() as told:
+            linked.load(small)
+    except AssertionError as error:
+        check("analyzed in memory" in str(error) and not told, str(error))
+    else:
+        check(False, "a small file is analyzed on the disk")
+
+
+def test_made_meanwhile():
+    """Another Blender analyzes the cloud and lets go what was built, just before this one begins: that cloud is taken."""
+    path = scan_file("large_meanwhile.las")
+    source, bare = linked.source(path), linked.source(path, analyzed=False)
+    with Small():
+        linked.load(source)
+    files = {place: place.read_bytes() for place in (source.kept.with_suffix(ending) for ending in (".cloud", ".json", ".scan"))}
+    forget(source)
+    start = disk.start_analysis
+
+    def meanwhile(*arguments, **more):
+        for place, data in files.items():
+            place.write_bytes(data)
+        bare.kept.unlink()
+        return start(*arguments, **more)
+
+    with Small(), OnDisk():
+        disk.start_analysis = meanwhile
+        check(linked.load(source).cloud.has_shapes, "not analyzed")
+    check(source.kept.read_bytes() == files[source.kept], "another cloud")
+
+
+def test_no_room_to_analyze():
+    """Where the disk has room for what was built, and not for what an analysis finds: that stays in memory, where it fits, else what is
+    wrong is said. What was built stays, and nothing is left beside it."""
+    try:
+        import resource
+    except ImportError:
+        raise Skip("this system does not limit what a process may write") from None
+    path = scan_file("large_no_room.las")
+    source, bare = linked.source(path), linked.source(path, analyzed=False)
+    with Small():
+        linked.load(bare)
+    before = set(SCRATCH.iterdir())
+    limits, heard, free = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN), memory.free
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (bare.kept.stat().st_size + 1000, limits[1]))
+        with Small():
+            check(linked.load(source).cloud.has_shapes, "not analyzed")
+            check(not source.kept.exists(), "a cloud is kept")
+            memory.free = lambda: 1000
+            try:
+                linked.load(source)
+            except native.PatinaError as error:
+                check(error.code == native.FILE and str(source.kept) in str(error), str(error))
+            else:
+                check(False, "analyzed without room")
+    finally:
+        memory.free = free
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, heard)
+    left = {item for item in set(SCRATCH.iterdir()) - before if item != source.kept.with_suffix(".scan")}
+    check(bare.kept.exists() and not left, f"left over: {left}")
+    with Small():
+        check(linked.load(source).cloud.has_shapes and source.kept.exists(), "with room")
+
+
 def test_goes_on_behind_the_build():
     """Whoever ends between build and analysis goes on from the cloud that was built."""
     path = scan_file("large_half.las")
@@ -462,15 +596,17 @@ def test_killed():
     with Small():
         linked.load(source)
     wanted = source.kept.read_bytes()
-    for wait in (0.1, 0.5):
+    for wait in (0.1, 0.5, "built"):
         forget(source)
         process = other(path)
         begins(process)
-        time.sleep(wait)
+        while wait == "built" and not linked.source(path, analyzed=False).kept.exists() and process.poll() is None:
+            time.sleep(0.005)
+        time.sleep(0.1 if wait == "built" else wait)  # built: it is being analyzed
         process.kill()
         process.communicate()
         with Small():
             linked.load(source)
-        check(source.kept.read_bytes() == wanted, f"killed after {wait} s: another cloud")
+        check(source.kept.read_bytes() == wanted, f"killed after {wait}: another cloud")
         left = {item.suffix for item in SCRATCH.glob(source.kept.name.split("-")[0] + "-*")}
-        check(left <= {".cloud", ".json", ".scan"}, f"killed after {wait} s: left over: {left}")
+        check(left <= {".cloud", ".json", ".scan"}, f"killed after {wait}: left over: {left}")

@@ -255,6 +255,102 @@ static void test_files(void **state)
     patina_cloud_destroy(cloud);
 }
 
+static void assert_same_file(const char *path, const char *other)
+{
+    static char one[1 << 16], two[1 << 16];
+    FILE *a = fopen(path, "rb"), *b = fopen(other, "rb");
+    size_t some;
+    assert_true(a && b);
+    do {
+        some = fread(one, 1, sizeof one, a);
+        assert_int_equal(fread(two, 1, sizeof two, b), some);
+        assert_memory_equal(one, two, some);
+    } while (some);
+    fclose(a);
+    fclose(b);
+}
+
+// A saved cloud is analysed to another file: as the call itself does it, below a cap and with room, with stations; errors and a cancel
+// leave nothing there.
+static void test_analyses_files(void **state)
+{
+    (void)state;
+    enum { LITTLE = 16 << 20 };
+#ifdef _WIN32
+    char folder[] = "patina-task-files";
+    assert_int_equal(mkdir(folder), 0);
+#else
+    char folder[] = "/tmp/patina-task-XXXXXX";
+    assert_non_null(mkdtemp(folder));
+#endif
+    char from[64], to[64], wanted[64], none[64];
+    static uint8_t station[POINTS];
+    static const double stations[2][3] = {{0.5, 0.5, 9.0}, {0.5, 0.5, -9.0}};
+    snprintf(from, sizeof from, "%s/plain", folder);
+    snprintf(to, sizeof to, "%s/found", folder);
+    snprintf(wanted, sizeof wanted, "%s/wanted", folder);
+    snprintf(none, sizeof none, "%s/none", folder);
+    const patina_cloud_desc desc = describe(POINTS);
+    patina_cloud *cloud = NULL;
+    patina_task *task = NULL;
+    patina_progress *progress = NULL;
+    for (int i = 0; i < POINTS; i++)
+        station[i] = points[i][2] < 0.5f;
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
+    assert_int_equal(patina_cloud_save(cloud, from), PATINA_OK);
+    patina_cloud_destroy(cloud);
+    for (int told = 0; told < 2; told++) {
+        patina_analysis_desc analysis = {.struct_size = sizeof analysis};
+        if (told) {
+            analysis.station_count = 2;
+            analysis.stations = &stations[0][0];
+            analysis.station = (patina_array){station, PATINA_UINT8, 1, 0};
+        }
+        assert_int_equal(patina_cloud_analyse_file(from, &analysis, LITTLE, wanted, NULL), PATINA_OK);
+        for (int room = 0; room < 2; room++) {
+            char first[64], second[64];
+            patina_analysis_desc given = analysis;
+            memcpy(first, from, sizeof first);
+            memcpy(second, to, sizeof second);
+            assert_int_equal(patina_progress_create(&progress), PATINA_OK);
+            assert_int_equal(patina_task_analyse_file(first, &given, room ? 0 : LITTLE, second, progress, &task), PATINA_OK);
+            memset(&given, 255, sizeof given); // descriptors and paths are copied
+            memset(first, 'x', sizeof first - 1);
+            memset(second, 'x', sizeof second - 1);
+            assert_int_equal(patina_task_wait(task), PATINA_OK);
+            assert_int_equal(patina_task_apply(task), PATINA_ERROR_EMPTY); // there is nothing to apply
+            patina_task_destroy(task);
+            assert_true(patina_progress_value(progress) == 1.0f);
+            patina_progress_destroy(progress);
+            assert_same_file(to, wanted);
+            assert_int_equal(unlink(to), 0);
+        }
+    }
+    assert_int_equal(patina_progress_create(&progress), PATINA_OK);
+    assert_int_equal(patina_task_analyse_file(from, NULL, LITTLE, to, progress, &task), PATINA_OK); // cancelled while it runs
+    while (!patina_task_done(task) && patina_progress_value(progress) < 0.05f)
+        usleep(1000);
+    patina_progress_cancel(progress);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_CANCELLED);
+    assert_non_null(strstr(message(task), "cancelled"));
+    patina_task_destroy(task);
+    patina_progress_destroy(progress);
+    assert_int_equal(patina_task_analyse_file(none, NULL, LITTLE, to, NULL, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_FILE);
+    assert_non_null(strstr(message(task), none));
+    patina_task_destroy(task);
+    const patina_analysis_desc wrong = {.struct_size = sizeof wrong, .neighbours = 2};
+    assert_int_equal(patina_task_analyse_file(from, &wrong, LITTLE, to, NULL, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_ARGUMENT);
+    patina_task_destroy(task);
+    assert_int_equal(patina_task_analyse_file(NULL, NULL, LITTLE, to, NULL, &task), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_task_analyse_file(from, NULL, LITTLE, NULL, NULL, &task), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_task_analyse_file(from, NULL, LITTLE, to, NULL, NULL), PATINA_ERROR_ARGUMENT);
+    unlink(from);
+    unlink(wanted);
+    assert_int_equal(rmdir(folder), 0); // nothing else was left
+}
+
 // Whatever is written over what a section of a saved cloud holds is found, and nothing is where nothing was.
 static void test_damaged_clouds(void **state)
 {
@@ -324,6 +420,7 @@ int main(void)
         cmocka_unit_test(test_fingerprints),
         cmocka_unit_test(test_colors),
         cmocka_unit_test(test_files),
+        cmocka_unit_test(test_analyses_files),
         cmocka_unit_test(test_damaged_clouds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

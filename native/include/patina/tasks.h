@@ -48,7 +48,10 @@ PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_pro
 PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
 PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
 PATINA_API int patina_task_end_build(patina_builder *builder, patina_progress *progress,
-                                     patina_task **out);                                           // patina_builder_end
+                                     patina_task **out); // patina_builder_end
+// patina_cloud_analyse_file; what desc points to must stay until the task is done, the paths are copied.
+PATINA_API int patina_task_analyse_file(const char *from, const patina_analysis_desc *desc, uint64_t memory, const char *to,
+                                        patina_progress *progress, patina_task **out);
 PATINA_API int patina_task_verify(const char *path, patina_progress *progress, patina_task **out); // patina_cloud_verify
 PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block
 // Waits for the end and returns what the call returned; its message is at the task.
