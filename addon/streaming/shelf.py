@@ -85,8 +85,8 @@ class Shelf:
                         raise
                     time.sleep(0.015)
         except OSError as error:
-            if isinstance(error, FileNotFoundError) and self._folder.is_dir():  # somebody clears it just now
-                return False
+            if isinstance(error, (FileNotFoundError, FileExistsError)) and self._folder.is_dir() and not path.parent.is_file():
+                return False  # somebody clears it just now; of a folder that comes and goes while it is made Python says that it is there
             with contextlib.suppress(OSError):
                 part.unlink()
             with self._lock:
