@@ -6,11 +6,11 @@
 #include "scene/page_sums.h"
 #include "scene/paged.h"
 
-int pt_plan_page(const struct patina_cloud *cloud, uint32_t c, const struct pt_eye *camera, const struct pt_object *object,
-                 const struct pt_extent *extent)
+int pt_plan_page(const struct patina_scene *scene, const struct patina_cloud *cloud, uint32_t c, const struct pt_eye *camera,
+                 const struct pt_object *object, const struct pt_extent *extent)
 {
     if (!cloud->paged)
-        return !pt_page_is_damaged(cloud, c);
+        return scene->in_parts || !pt_page_is_damaged(cloud, c);
     const double pixel = pt_most(camera->xs, camera->ys) *
                          (camera->orthographic ? 1.0 : pt_most(extent->z_before, camera->near_clip));
     return pt_paged_look(cloud, c, 2.0 * (double)cloud->chunks[c].gap * object->scale / pixel);

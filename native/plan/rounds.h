@@ -22,6 +22,9 @@ struct pt_chunk_range {
     uint64_t bytes; // of files
 };
 
+// How many of `all` the shares of parts up to this one hold.
+static inline uint64_t pt_share_before(const patina_part *part, uint64_t to, uint64_t all) { return all * to / part->of; }
+
 // Whether the pass comes to the same by ranges of chunks in turn: it takes a minimum, or writes what belongs to its chunks alone.
 int pt_pass_divides(const struct pt_pass *pass);
 // The lists of a pass, all their chunks; lists: room for as many as the pass has references. Returns how many.

@@ -53,7 +53,7 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
     if (!pt_kind_bounds(p->eye, PT_AS_SOFT, &what, chunk, rows, translation, &extent))
         return PATINA_OK;
     const struct patina_cloud *cloud = out->instance->cloud;
-    if (!pt_plan_page(cloud, (uint32_t)(chunk - cloud->chunks), p->eye, object, &extent))
+    if (!pt_plan_page(p->scene, cloud, (uint32_t)(chunk - cloud->chunks), p->eye, object, &extent))
         return PATINA_OK;
     const double pixel = (double)plan->view.footprint * (plan->view.perspective ? fabs(extent.z_beyond) : 1.0) *
                          (double)PT_SOFT_LEAST;

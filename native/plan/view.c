@@ -176,7 +176,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         double left_out, rim;
         if (!pt_detail_draws(&detail, chunk, pixel * before / object->scale, &left_out))
             continue;
-        if (!pt_plan_page(cloud, c, camera, object, &seen.extent))
+        if (!pt_plan_page(scene, cloud, c, camera, object, &seen.extent))
             continue;
         const double stretch = stretch_of(camera, &seen.extent, &rim);
         for (int k = 0; k < 4; k++)

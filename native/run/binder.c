@@ -3,6 +3,7 @@
 
 #include "plan/ranges.h"
 #include "scene/mask.h"
+#include "scene/page_sums.h"
 #include "scene/scans.h"
 
 #include <stdlib.h>
@@ -24,6 +25,7 @@ void pt_binder_close(struct pt_binder *binder)
     const struct pt_plan *plan = binder->plan;
     for (uint32_t i = 0; i < plan->instance_count + plan->soft_entries && binder->instances; i++) {
         binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].chunks);
+        free(binder->instances[i].sound);
         for (int k = 0; k < PT_RANGE_FINER; k++)
             binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].fine[k]);
     }
@@ -34,12 +36,32 @@ void pt_binder_close(struct pt_binder *binder)
     free(binder->meshes);
 }
 
+// Those that are not known to be damaged.
+static uint32_t take_sound(const struct patina_cloud *cloud, const struct chunk_view *chunks, uint32_t count,
+                           struct chunk_view *out)
+{
+    uint32_t some = 0;
+    for (uint32_t i = 0; i < count; i++)
+        if (!pt_page_is_damaged(cloud, pt_page_at(cloud, chunks[i].first)))
+            out[some++] = chunks[i];
+    return some;
+}
+
 int pt_bind_chunks(struct pt_binder *binder, uint32_t instance, const struct chunk_view *chunks, uint32_t count)
 {
-    struct pt_buffer *buffer = &binder->instances[instance].chunks;
-    binder->device->ops->buffer_destroy(binder->device, buffer);
-    binder->instances[instance].placed = 1;
-    return binder->device->ops->buffer_create(binder->device, count * sizeof *chunks, chunks, 1, buffer);
+    struct pt_bound_instance *bound = &binder->instances[instance];
+    const struct patina_cloud *cloud = binder->plan->instances[instance].instance->cloud;
+    binder->device->ops->buffer_destroy(binder->device, &bound->chunks);
+    bound->placed = 1;
+    free(bound->sound);
+    bound->sound = NULL;
+    if (binder->in_parts && pt_pages_are_damaged(cloud)) { // the plan has them all
+        if (!(bound->sound = malloc((count + (size_t)1) * sizeof *bound->sound)))
+            return pt_fail(&binder->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+        count = take_sound(cloud, chunks, count, bound->sound);
+        chunks = bound->sound;
+    }
+    return binder->device->ops->buffer_create(binder->device, count * sizeof *chunks, chunks, 1, &bound->chunks);
 }
 
 static int take_cloud(struct pt_binder *binder, struct pt_bound_instance *bound, const struct patina_cloud *cloud)

@@ -13,6 +13,7 @@ struct pt_bound_instance {
     struct pt_resident *cloud, *mask, *grade, *field, *scans; // NULL: not asked for yet
     struct pt_buffer chunks, fine[PT_RANGE_FINER];            // fine: from PT_FINE_CHUNKS on
     int placed;                                               // these are there, if only none
+    struct chunk_view *sound;                                 // what they lie in, where some pages are left out
 };
 
 struct pt_bound_mesh {
@@ -28,6 +29,7 @@ struct pt_binder {
     struct pt_shadows *shadows;
     struct pt_bound_instance *instances, *receivers;
     struct pt_bound_mesh *meshes;
+    int in_parts;          // the plan holds damaged pages too: they are not bound
     struct pt_buffer none; // never written: kernels that bind it do not touch it
 };
 

@@ -32,7 +32,6 @@ static int bake_once(struct patina_frame *frame, const struct patina_scene *scen
         frame->layers[0] = first;
     }
     pt_plan_destroy(&plan);
-    atomic_store(&frame->cancel, 0);
     if (error == PATINA_ERROR_CANCELLED)
         return pt_fail(&frame->handle, error, "baking shadows was cancelled");
     return error == PT_AGAIN ? error : error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
@@ -44,6 +43,7 @@ int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
     do
         error = bake_once(frame, scene);
     while (error == PT_AGAIN);
+    atomic_store(&frame->cancel, 0);
     return error;
 }
 

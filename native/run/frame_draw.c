@@ -101,12 +101,14 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
                                                 .residency = &frame->residency,
                                                 .planes = &frame->planes,
                                                 .picture = &frame->planes,
+                                                .in_parts = frame->merge != NULL,
                                                 .own = &frame->own,
                                                 .shadows = &frame->shadows}};
     frame->keys_valid = 0;
     link_planes(frame);
     frame->layers[0] = (struct pt_layer){.points = plan->points_scattered};
-    frame->pager.unchecked = frame->merge != NULL;
+    frame->pager.merged = frame->merge != NULL;
+    frame->pager.cancel = &frame->cancel;
     int error = pt_shadows_open(frame->device, &frame->shadows, scene, plan);
     if (!error && !(error = pt_pager_open(&frame->pager, frame->device, scene))) {
         error = pt_execute(&execution);

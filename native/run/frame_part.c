@@ -27,9 +27,10 @@ static int bind_share(struct pt_execution *e, const patina_part *part)
     int error = PATINA_OK;
     for (uint32_t i = 0; i < e->plan->instance_count && !error; i++) {
         const struct pt_plan_instance *instance = &e->plan->instances[i];
-        const uint64_t count = instance->chunk_count, first = count * (part->part - 1) / part->of;
+        const uint64_t count = instance->chunk_count, first = pt_share_before(part, part->part - 1, count);
         if (count)
-            error = pt_bind_chunks(&e->binder, i, instance->chunks + first, (uint32_t)(count * part->part / part->of - first));
+            error = pt_bind_chunks(&e->binder, i, instance->chunks + first,
+                                   (uint32_t)(pt_share_before(part, part->part, count) - first));
     }
     return error;
 }
@@ -78,6 +79,23 @@ static int write_keys(struct part_job *job, struct pt_execution *e, const struct
     return error;
 }
 
+static int is_run(const struct pt_pass *pass, uint32_t layer)
+{
+    return pass->kernel == PT_KERNEL_sift || (pt_is_of_parts(pass) && pass->layer == layer);
+}
+
+// The share's damaged pages, where the device reads in ranges.
+static int look_at_share(struct part_job *job, struct pt_execution *e, uint32_t layer)
+{
+    int found = PATINA_OK;
+    for (uint32_t i = 0; i < e->plan->pass_count && found >= 0; i++) {
+        const struct pt_pass *pass = &e->plan->passes[i];
+        const int one = is_run(pass, layer) ? pt_pager_begin_pass(e->pager, e->plan, pass, job->part) : PATINA_OK;
+        found = one ? one : found;
+    }
+    return found;
+}
+
 // The passes of points of a layer, or (0) of a map.
 static int run_points(struct part_job *job, struct pt_execution *e, uint32_t layer)
 {
@@ -86,6 +104,8 @@ static int run_points(struct part_job *job, struct pt_execution *e, uint32_t lay
     int error = pt_binder_open(&e->binder);
     if (!error)
         error = bind_share(e, job->part);
+    if (!error)
+        error = look_at_share(job, e, layer);
     for (uint32_t i = 0; i < plan->pass_count && !error; i++) {
         const struct pt_pass *pass = &plan->passes[i];
         if (pass->kernel == PT_KERNEL_sift)
@@ -123,6 +143,7 @@ static struct pt_execution execution_of(struct part_job *job, struct pt_plan *pl
                                             .residency = &frame->residency,
                                             .planes = &job->planes,
                                             .picture = &job->planes,
+                                            .in_parts = 1,
                                             .own = plan->map ? &frame->shadows.own : &frame->own,
                                             .shadows = &frame->shadows}};
 }
@@ -198,7 +219,7 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
     struct part_job job = {.frame = frame, .scene = scene, .part = part, .planes = {.varies = 1}};
     struct pt_keys_head head;
     frame->times.count = 0;
-    frame->pager = (struct pt_pager){0};
+    frame->pager = (struct pt_pager){.cancel = &frame->cancel};
     int error = pt_plan_create(scene, &job.plan);
     if (error)
         return pt_fail_again(&frame->handle, error);
@@ -217,7 +238,6 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
     pt_key_file_close(&job.before);
     pt_planes_release(frame->device, &job.planes);
     pt_plan_destroy(&job.plan);
-    atomic_store(&frame->cancel, 0);
     if (error == PATINA_ERROR_CANCELLED)
         return pt_fail(&frame->handle, error, "scattering was cancelled");
     return error == PT_AGAIN ? error : error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
@@ -225,10 +245,13 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
 
 int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scene, const patina_part *part, const char *path)
 {
+    struct patina_scene whole = *scene; // its handle is not touched
     int error;
+    whole.in_parts = 1;
     do
-        error = scatter_once(frame, scene, part, path);
+        error = scatter_once(frame, &whole, part, path);
     while (error == PT_AGAIN);
+    atomic_store(&frame->cancel, 0);
     return error;
 }
 
@@ -236,12 +259,14 @@ int pt_frame_merge(struct patina_frame *frame, const struct patina_scene *scene,
                    const char *next, uint32_t *round)
 {
     struct pt_merge merge;
+    struct patina_scene whole = *scene; // its handle is not touched
     *round = 0;
+    whole.in_parts = 1;
     int error = pt_merge_open(&merge, &frame->handle, paths, count);
     if (!error) {
         merge.next = next;
         frame->merge = &merge;
-        error = pt_frame_render(frame, scene);
+        error = pt_frame_render(frame, &whole);
         frame->merge = NULL;
         *round = merge.wanted;
     }

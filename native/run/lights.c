@@ -29,6 +29,7 @@ static int run_plan(struct pt_execution *e, struct pt_plan *plan)
                                             .residency = e->binder.residency,
                                             .planes = &shadows->planes,
                                             .picture = e->binder.planes,
+                                            .in_parts = e->binder.in_parts,
                                             .own = &shadows->own,
                                             .shadows = shadows}};
     const int error = pt_execute(&inner);

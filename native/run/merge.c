@@ -92,6 +92,7 @@ void pt_merge_close(struct pt_merge *merge)
 int pt_merge_begin(struct pt_merge *merge, const struct patina_scene *scene, const struct pt_plan *plan)
 {
     const char *refused = pt_parts_refused(scene, plan);
+    merge->last = (struct pt_keys_name){.layer = UINT32_MAX}; // it may begin once more
     if (refused)
         return pt_fail(merge->handle, PATINA_ERROR_UNSUPPORTED,
                        "%s not scattered in parts: render the picture whole, or in tiles", refused);

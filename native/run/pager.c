@@ -5,6 +5,7 @@
 
 #include "base/platform.h"
 #include "residency.h"
+#include "scene/page_sums.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -163,26 +164,42 @@ static void look(void *context)
 // Where all fits, of a chunk that a pass walks all that the file has; else, for it would be read in vain, what says where its points are.
 static uint32_t looked_at(const struct pt_pager *pager) { return pager->cap ? 1u << PT_ARRAY_POSITIONS : UINT32_MAX; }
 
-// What a pass reads of files: of a range, and where some of that is damaged, of all others too, for the picture is planned once more then.
-static int check_range(const struct pt_pager *pager, const struct pt_chunk_list *lists, uint32_t count,
-                       const struct pt_chunk_range *range)
+static void make_room_for(void *pager, uint64_t more) { make_room(pager, more); }
+
+// What a pass walks of files: all of its lists, of which no more is held than of a pass in rounds.
+static int check_lists(struct pt_pager *pager, const struct pt_pass *pass, const struct pt_chunk_list *lists, uint32_t count)
 {
-    if (pager->unchecked)
-        return PATINA_OK;
-    const int found = pt_check_range(lists, range, looked_at(pager));
-    if (found != PT_AGAIN)
-        return found;
-    const struct pt_chunk_range all = {.end_list = count};
-    const int more = pt_check_range(lists, &all, looked_at(pager));
-    return more < 0 ? more : PT_AGAIN;
+    const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, make_room_for, pager};
+    const uint64_t most = pager->cap ? pager->round : UINT64_MAX;
+    int found = PATINA_OK;
+    for (struct pt_chunk_range range = {0}; found >= 0 && pt_next_range(lists, count, most, &range);) {
+        const int one = pt_check_range(&how, lists, &range);
+        found = one ? one : found;
+    }
+    for (uint32_t i = 0; i < count; i++)
+        pt_pages_tell(lists[i].cloud);
+    return found;
 }
 
-static int check_clouds(const struct patina_scene *scene)
+// A range of them; where some of it is damaged, all others too, for the picture is planned once more then.
+static int check_range(struct pt_pager *pager, const struct pt_pass *pass, const struct pt_chunk_list *lists, uint32_t count,
+                       const struct pt_chunk_range *range)
 {
+    const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, NULL, NULL};
+    const int found = pt_check_range(&how, lists, range);
+    const int more = found == PT_AGAIN ? check_lists(pager, pass, lists, count) : PATINA_OK;
+    return more < 0 ? more : found;
+}
+
+static int check_clouds(const struct pt_pager *pager)
+{
+    const struct pt_check how = {UINT32_MAX, pager->cancel, NULL, NULL};
     int found = PATINA_OK;
-    for (uint32_t i = 0; i < scene->cloud_count && found >= 0; i++) {
-        const int one = pt_check_cloud(scene->instances[i].cloud);
+    for (uint32_t i = 0; i < pager->scene->cloud_count && found >= 0; i++) {
+        const struct patina_cloud *cloud = pager->scene->instances[i].cloud;
+        const int one = pt_check_cloud(&how, cloud);
         found = one ? one : found;
+        pt_pages_tell(cloud);
     }
     return found;
 }
@@ -196,8 +213,10 @@ int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const st
     const int error = device->copies ? open_copies(pager, device) : PATINA_OK;
     if (error)
         return error;
-    if (device->copies && pager->mapped && !pager->cap && !pager->unchecked) { // it takes all of them
-        const int damaged = check_clouds(scene);
+    for (uint32_t i = 0; i < scene->cloud_count; i++) // what others found, who draw nothing
+        pt_pages_tell(scene->instances[i].cloud);
+    if (device->copies && pager->mapped && !pager->cap) { // it takes all of them
+        const int damaged = check_clouds(pager);
         if (damaged)
             return damaged;
     }
@@ -227,24 +246,33 @@ void pt_pager_close(struct pt_pager *pager)
 
 // ---- rounds --------------------------------------------------------------------------------------------------------------
 
+int pt_pager_begin_pass(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass, const patina_part *part)
+{
+    if (!pager || !pager->mapped || !pager->device->copies || !pager->cap ||
+        (pager->merged && pass->kernel == PT_KERNEL_scatter))
+        return PATINA_OK;
+    struct pt_chunk_list *lists = calloc(pass->ref_count + 1u, sizeof *lists);
+    if (!lists)
+        return pt_fail(&pager->device->handle, PATINA_ERROR_MEMORY, "looking at pages of files: out of memory");
+    const uint32_t count = pt_pass_lists(plan, pass, lists);
+    for (uint32_t i = 0; i < count && part; i++) {
+        const uint64_t all = lists[i].count, first = pt_share_before(part, part->part - 1, all);
+        lists[i].chunks += first;
+        lists[i].count = (uint32_t)(pt_share_before(part, part->part, all) - first);
+    }
+    const int error = check_lists(pager, pass, lists, count);
+    free(lists);
+    return error;
+}
+
 int pt_pager_begin(struct pt_pager *pager, const struct pt_plan *plan)
 {
-    if (!pager || !pager->mapped || !pager->device->copies || !pager->cap || pager->unchecked)
-        return PATINA_OK;
-    int error = PATINA_OK;
-    for (uint32_t i = 0; i < plan->pass_count && !error; i++) {
-        const struct pt_pass *pass = &plan->passes[i];
-        struct pt_chunk_list *lists = calloc(pass->ref_count + 1u, sizeof *lists);
-        if (!lists)
-            return PATINA_ERROR_MEMORY;
-        const uint32_t count = pt_pass_lists(plan, pass, lists);
-        for (struct pt_chunk_range range = {0}; !error && pt_next_range(lists, count, pager->round, &range);) {
-            make_room(pager, range.bytes);
-            error = check_range(pager, lists, count, &range);
-        }
-        free(lists);
+    int found = PATINA_OK;
+    for (uint32_t i = 0; i < plan->pass_count && found >= 0; i++) {
+        const int one = pt_pager_begin_pass(pager, plan, &plan->passes[i], NULL);
+        found = one ? one : found;
     }
-    return error;
+    return found;
 }
 
 // What a range of lists is of one of them: [first, end).
@@ -296,8 +324,8 @@ static int run_range(const struct bound *bound, struct pt_buffer *const *whole, 
 }
 
 // One after another; while one is drawn, the disk reads the next.
-static int run_ranges(struct pt_pager *pager, const struct bound *bound, struct pt_buffer *const *whole, pt_run_bound *run,
-                      void *context)
+static int run_ranges(struct pt_pager *pager, const struct pt_pass *pass, const struct bound *bound,
+                      struct pt_buffer *const *whole, pt_run_bound *run, void *context)
 {
     struct pt_chunk_range range = {0}, next;
     int error = PATINA_OK, some = pt_next_range(bound->lists, bound->count, pager->round, &range);
@@ -308,7 +336,7 @@ static int run_ranges(struct pt_pager *pager, const struct bound *bound, struct 
         if (some)
             expect(bound->lists, bound->count, &next);
         make_room(pager, range.bytes);
-        error = check_range(pager, bound->lists, bound->count, &range);
+        error = check_range(pager, pass, bound->lists, bound->count, &range);
         error = error ? error : run_range(bound, whole, &range, run, context);
         range = next;
     }
@@ -342,10 +370,9 @@ int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struc
     int error;
     if (bound.parts && bound.buffers) {
         memcpy(bound.buffers, buffers, pass->ref_count * sizeof *bound.buffers);
-        error = run_ranges(pager, &bound, buffers, run, context);
+        error = run_ranges(pager, pass, &bound, buffers, run, context);
     } else { // in one, which need not be held whole: whoever runs it looks after that
-        const struct pt_chunk_range all = {.end_list = bound.count};
-        error = bound.lists ? check_range(pager, bound.lists, bound.count, &all) : PATINA_OK;
+        error = bound.lists ? check_lists(pager, pass, bound.lists, bound.count) : PATINA_OK;
         error = error ? error : run(context, buffers);
     }
     free(bound.lists);

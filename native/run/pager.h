@@ -18,7 +18,8 @@ struct pt_pager {
     atomic_uint returned;
     uint64_t mapped, read;
     uint32_t rounds;
-    int unchecked; // pages are taken as they are: of parts that are merged others have read them
+    int merged;               // parts' keys stand for those of passes that write least keys, which do not run
+    const atomic_int *cancel; // NULL: nothing stops it
 };
 
 // Pages that are read for the first time are looked at: what begins, opens and runs may return PT_AGAIN (page_check.h).
@@ -28,6 +29,9 @@ int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const st
 void pt_pager_close(struct pt_pager *pager);
 // Before the plan runs: a device that copies clouds in ranges reads what its passes walk, which is looked at here.
 int pt_pager_begin(struct pt_pager *pager, const struct pt_plan *plan);
+// The same of one of its passes; part: of its share of the chunks, NULL: of all.
+int pt_pager_begin_pass(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
+                        const patina_part *part);
 // The cap that a picture of the scene would have, and how much a round of it reads; 0: all of it fits.
 uint64_t pt_pager_cap(const struct patina_device *device, const struct patina_scene *scene, uint64_t *round);
 

@@ -87,6 +87,24 @@ void pt_page_sums_destroy(struct pt_page_sums *pages)
     free(pages);
 }
 
+uint32_t pt_page_at(const struct patina_cloud *cloud, uint32_t first)
+{
+    uint32_t low = 0, high = cloud->chunk_count - 1;
+    while (low < high) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (cloud->chunks[middle].first < first)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+int pt_pages_are_damaged(const struct patina_cloud *cloud)
+{
+    return cloud->page_sums && atomic_load_explicit(&cloud->page_sums->damaged, memory_order_relaxed);
+}
+
 int pt_page_is_damaged(const struct patina_cloud *cloud, uint32_t chunk)
 {
     return cloud->page_sums && atomic_load_explicit(&cloud->page_sums->states[chunk], memory_order_relaxed) & PT_PAGE_DAMAGED;
@@ -127,23 +145,39 @@ int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arr
     if (!(good | bad))
         return 0;
     const uint32_t before = atomic_fetch_or(&cloud->page_sums->states[chunk], good | bad);
-    return bad && !(before & PT_PAGE_DAMAGED);
+    if (!bad || before & PT_PAGE_DAMAGED)
+        return 0;
+    atomic_fetch_add(&cloud->page_sums->damaged, 1);
+    atomic_fetch_add(&cloud->page_sums->untold, 1);
+    return 1;
 }
 
-void pt_page_tell(const struct patina_cloud *cloud, uint32_t chunk, uint32_t pages, uint64_t points)
+// ---- told --------------------------------------------------------------------------------------------------------------
+
+void pt_pages_tell(const struct patina_cloud *cloud)
 {
-    const struct pt_chunk *at = &cloud->chunks[chunk];
+    struct pt_page_sums *sums = cloud->page_sums;
+    uint32_t pages = 0, first = 0;
+    uint64_t points = 0;
+    if (!sums || !atomic_exchange(&sums->untold, 0))
+        return;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        if (pt_page_is_damaged(cloud, c) && !(atomic_fetch_or(&sums->states[c], PT_PAGE_TOLD) & PT_PAGE_TOLD)) {
+            first = pages++ ? first : c;
+            points += cloud->chunks[c].count;
+        }
+    if (!pages)
+        return;
+    const struct pt_chunk *at = &cloud->chunks[first];
     double middle[3];
     for (int k = 0; k < 3; k++)
         middle[k] = at->origin[k] + 0.5 * ((double)at->box_min[k] + (double)at->box_max[k]);
     if (pages == 1)
         pt_log(PT_LOG_WARNING, "%s: page %u of %u is damaged, and its %llu points about (%.10g, %.10g, %.10g) are left out",
-               cloud->page_sums->path, chunk + 1, cloud->chunk_count, (unsigned long long)points, middle[0], middle[1],
-               middle[2]);
+               sums->path, first + 1, cloud->chunk_count, (unsigned long long)points, middle[0], middle[1], middle[2]);
     else
         pt_log(PT_LOG_WARNING,
                "%s: %u of %u pages are damaged, and their %llu points are left out; the first is page %u, about (%.10g, %.10g, "
                "%.10g)",
-               cloud->page_sums->path, pages, cloud->chunk_count, (unsigned long long)points, chunk + 1, middle[0], middle[1],
-               middle[2]);
+               sums->path, pages, cloud->chunk_count, (unsigned long long)points, first + 1, middle[0], middle[1], middle[2]);
 }

@@ -15,10 +15,12 @@ static inline size_t pt_page_sum_bytes(uint64_t chunks) { return (size_t)chunks 
 struct pt_page_sums {
     uint32_t *sums;
     atomic_uint *states; // a chunk: bits 1 << array: is as it was written; PT_PAGE_DAMAGED: is not, and is left out
+    atomic_uint damaged; // how many
+    atomic_uint untold;  // since the log was told of some
     uint32_t chunk_count, arrays;
     char *path; // of the file
 };
-enum { PT_PAGE_DAMAGED = 1 };
+enum { PT_PAGE_DAMAGED = 1, PT_PAGE_TOLD = 1 << 30 };
 
 // Makes those of a file that is written: arrays come in pieces, each from chunk to chunk.
 struct pt_page_summing {
@@ -36,13 +38,16 @@ void pt_page_summing_end(struct pt_page_summing *summing);
 struct pt_page_sums *pt_page_sums_create(const struct patina_cloud *cloud, uint32_t *sums, const char *path);
 void pt_page_sums_destroy(struct pt_page_sums *pages); // NULL is fine
 
-// Whether a chunk was found to be damaged.
+// The chunk that begins at a slot.
+uint32_t pt_page_at(const struct patina_cloud *cloud, uint32_t first);
+// Whether some chunk, or this one, was found to be damaged.
+int pt_pages_are_damaged(const struct patina_cloud *cloud);
 int pt_page_is_damaged(const struct patina_cloud *cloud, uint32_t chunk);
 // Whether these arrays (bits 1 << pt_array) of the chunk need a look yet: those that lie in the file. Any thread.
 uint32_t pt_page_unseen(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays);
 // Looks at them. 1: it is damaged, and nobody had found it before. Any thread.
 int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays);
-// One line of the log on so many pages that were found, the first of them `chunk`.
-void pt_page_tell(const struct patina_cloud *cloud, uint32_t chunk, uint32_t pages, uint64_t points);
+// One line of the log on all pages that were found since it was told last; none where there are none. Any thread.
+void pt_pages_tell(const struct patina_cloud *cloud);
 
 #endif

@@ -43,6 +43,7 @@ struct patina_scene {
     patina_lines lines;       // defaults made explicit
     int has_lines;
     uint32_t finer; // pixels on each side of one that the caller asked for: of its samples. 0 or 1: it is one
+    int in_parts;   // drawn so: plans leave no damaged page out, for all parts must agree on them; binding does
 };
 
 // Lengths in pixels, of a picture of so many times finer ones.
