@@ -227,6 +227,8 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
     if (!cloud || !path)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save: bad arguments");
     int error = pt_paged_refuse(cloud, "patina_cloud_save");
+    if (!error)
+        error = pt_pages_refuse(cloud, pt_free_memory() / 3, NULL);
     if (error)
         return error;
     pt_paged_enter(cloud, 1);
@@ -365,40 +367,73 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
 
 // ---- verify ------------------------------------------------------------------------------------------------------------
 
-// Whether a section of the file, from byte `at` on, still has the sum that it was written with.
-static int verify_section(const char *path, const struct pt_disk *disk, const struct header *header, uint64_t at, uint64_t size,
-                          uint64_t wanted, char *buffer, patina_progress *progress)
+struct verified {
+    const char *path;
+    const struct pt_disk *disk;
+    char *buffer; // of PIECE bytes
+    patina_progress *progress;
+};
+
+// The sum of a section of the file, from byte `at` on: *pieces, of one piece after another, or *whole, of all at one go; NULL: not asked for.
+static int sum_section(const struct verified *v, uint64_t at, uint64_t size, uint64_t *pieces, struct pt_sum *whole)
 {
-    uint64_t sum = header->version;
     for (uint64_t done = 0; done < size;) {
         const size_t piece = size - done < PIECE ? size - done : PIECE;
         size_t got;
-        int error = pt_disk_read(disk, at + done, buffer, piece, &got);
+        int error = pt_disk_read(v->disk, at + done, v->buffer, piece, &got);
         if (error)
-            return fail_with(path, "read", error);
+            return fail_with(v->path, "read", error);
         if (got != piece)
-            return refuse(path, "a saved cloud that was cut short");
-        if (pt_progress_cancelled(progress))
-            return pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: cancelled", path);
-        sum = add_piece(sum, buffer, piece);
+            return refuse(v->path, "a saved cloud that was cut short");
+        if (pt_progress_cancelled(v->progress))
+            return pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: cancelled", v->path);
+        if (pieces)
+            *pieces = add_piece(*pieces, v->buffer, piece);
+        if (whole)
+            pt_sum_add(whole, v->buffer, piece);
         done += piece;
     }
-    return sum == wanted ? PATINA_OK : refuse(path, "a saved cloud whose points are damaged");
+    return PATINA_OK;
 }
 
-static int verify_disk(const char *path, const struct pt_disk *disk, char *buffer, patina_progress *progress)
+// What the header says of itself, chunks and the sums of pages; head: of the header and chunks.
+static int verify_head(const struct verified *v, const struct header *header, const struct pt_sum *head, uint64_t at)
+{
+    uint64_t check = pt_sum_end(head);
+    if (header->version != WITHOUT_PAGES)
+        check = pt_fingerprint(check, &header->page_sum, sizeof header->page_sum);
+    if (check != header->check)
+        return refuse(v->path, "its header or chunks are damaged");
+    if (header->version == WITHOUT_PAGES || !header->chunk_count)
+        return PATINA_OK;
+    struct pt_sum pages;
+    pt_sum_begin(&pages, VERSION);
+    const int code = sum_section(v, at, pt_page_sum_bytes(header->chunk_count), NULL, &pages);
+    return code                                     ? code
+           : pt_sum_end(&pages) != header->page_sum ? refuse(v->path, "the check sums of its pages are damaged")
+                                                    : PATINA_OK;
+}
+
+// Whether all of the file still has the sums that it was written with.
+static int verify_disk(const struct verified *v)
 {
     struct header header;
     struct pt_section sections[SECTIONS];
     struct patina_cloud cloud = {0};
-    int code = read_header(path, disk, &cloud, &header, sections);
+    struct pt_sum head;
+    int code = read_header(v->path, v->disk, &cloud, &header, sections);
     uint64_t at = SECTION;
+    if (!code)
+        pt_sum_begin(&head, pt_fingerprint(header.version, &header, offsetof(struct header, check)));
     for (int i = 0; i < SECTIONS && !code; i++) {
-        code = verify_section(path, disk, &header, at, sections[i].size, header.sums[i], buffer, progress);
+        uint64_t sum = header.version;
+        code = sum_section(v, at, sections[i].size, &sum, i == PT_ARRAY_CHUNKS ? &head : NULL);
+        if (!code && sum != header.sums[i])
+            code = refuse(v->path, "a saved cloud whose points are damaged");
         at += round_section(sections[i].size);
-        pt_progress_set(progress, (double)at / (double)header.size);
+        pt_progress_set(v->progress, (double)at / (double)header.size);
     }
-    return code;
+    return code ? code : verify_head(v, &header, &head, at);
 }
 
 int patina_cloud_verify(const char *path, patina_progress *progress)
@@ -410,8 +445,8 @@ int patina_cloud_verify(const char *path, patina_progress *progress)
     if (error)
         return fail_with(path, "read", error);
     char *buffer = malloc(PIECE);
-    int code = buffer ? verify_disk(path, &disk, buffer, progress)
-                      : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    const struct verified v = {path, &disk, buffer, progress};
+    int code = buffer ? verify_disk(&v) : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
     free(buffer);
     pt_disk_close(&disk);
     return code;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "page_sums.h"
 
+#include "base/progress.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -180,4 +182,34 @@ void pt_pages_tell(const struct patina_cloud *cloud)
                "%s: %u of %u pages are damaged, and their %llu points are left out; the first is page %u, about (%.10g, %.10g, "
                "%.10g)",
                sums->path, pages, cloud->chunk_count, (unsigned long long)points, first + 1, middle[0], middle[1], middle[2]);
+}
+
+int pt_pages_refuse(const struct patina_cloud *cloud, uint64_t held, patina_progress *progress)
+{
+    uint32_t pages = 0, first = 0;
+    uint64_t each = 0, read = 0;
+    for (int i = PT_ARRAY_POSITIONS; i <= PT_ARRAY_SHAPES; i++)
+        each += pt_cloud_point_bytes(cloud, (enum pt_array)i);
+    for (uint32_t c = 0; cloud->page_sums && c < cloud->chunk_count; c++) {
+        const uint64_t bytes = cloud->chunks[c].padded * each;
+        if (pt_progress_cancelled(progress))
+            return pt_fail(&cloud->handle, PATINA_ERROR_CANCELLED, "%s: cancelled", cloud->page_sums->path);
+        if (read && read + bytes > held) {
+            pt_cloud_return(cloud);
+            read = 0;
+        }
+        read += bytes;
+        pt_page_check(cloud, c, UINT32_MAX);
+        if (pt_page_is_damaged(cloud, c))
+            first = pages++ ? first : c;
+    }
+    if (!pages)
+        return PATINA_OK;
+    if (pages == 1)
+        return pt_fail(&cloud->handle, PATINA_ERROR_FORMAT,
+                       "%s: page %u of %u is damaged: nothing is written, for it would pass as good", cloud->page_sums->path,
+                       first + 1, cloud->chunk_count);
+    return pt_fail(&cloud->handle, PATINA_ERROR_FORMAT,
+                   "%s: %u of %u pages are damaged, the first is page %u: nothing is written, for they would pass as good",
+                   cloud->page_sums->path, pages, cloud->chunk_count, first + 1);
 }

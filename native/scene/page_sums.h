@@ -49,5 +49,8 @@ uint32_t pt_page_unseen(const struct patina_cloud *cloud, uint32_t chunk, uint32
 int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays);
 // One line of the log on all pages that were found since it was told last; none where there are none. Any thread.
 void pt_pages_tell(const struct patina_cloud *cloud);
+// Looks at all that lies in the file: nothing of a damaged page may be written as if it were good. PATINA_ERROR_FORMAT, which names file
+// and page; PATINA_ERROR_CANCELLED. held: bytes after which what was read is given back.
+int pt_pages_refuse(const struct patina_cloud *cloud, uint64_t held, patina_progress *progress);
 
 #endif

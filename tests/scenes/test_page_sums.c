@@ -503,6 +503,76 @@ static void test_below_cap(void **state)
     }
 }
 
+// ---- written -----------------------------------------------------------------------------------------------------------
+
+// Saved or analysed, damage would get sums that say that it is good: it is refused, nothing is written, and pictures still tell of it.
+static void test_not_written(void **state)
+{
+    (void)state;
+    char log[2048], wanted[128];
+    const uint32_t some[] = {3, 5};
+    for (uint32_t count = 1; count <= 2; count++) {
+        size_t size;
+        unsigned char *data = bytes_of(good, &size);
+        damage(some, count, positions_at(data), 12);
+        free(data);
+        patina_device *device = support_device_first();
+        const patina_settings settings = plain_settings();
+        patina_cloud *cloud = open_cloud(bad);
+        snprintf(wanted, sizeof wanted,
+                 count > 1 ? "%s: 2 of %u pages are damaged, the first is page 4" : "%s: page 4 of %u is damaged", bad,
+                 cloud->chunk_count);
+        remove(other);
+        drain(log, sizeof log);
+        assert_int_equal(patina_cloud_save(cloud, other), PATINA_ERROR_FORMAT);
+        assert_non_null(strstr(support_message(cloud), wanted));
+        assert_int_equal(patina_cloud_save(cloud, bad), PATINA_ERROR_FORMAT); // onto itself
+        assert_int_equal(drain(log, sizeof log), 2);
+        struct picture picture = render_with(device, cloud, &settings);
+        assert_int_equal(drain(log, sizeof log), 1);
+        assert_non_null(strstr(log, "left out"));
+        picture_free(&picture);
+        patina_cloud_destroy(cloud);
+        const patina_analysis_desc analysis = {.struct_size = sizeof analysis, .keep_normals = 1};
+        assert_int_equal(patina_cloud_analyse_file(bad, &analysis, 0, other, NULL), PATINA_ERROR_FORMAT);
+        assert_non_null(strstr(support_message(NULL), wanted));
+        FILE *stream = fopen(other, "rb");
+        assert_null(stream);
+        patina_device_destroy(device);
+    }
+    patina_cloud *cloud = open_cloud(good);
+    size_t sizes[2];
+    CHECK(patina_cloud_save(cloud, other), cloud); // what is good is as it was
+    unsigned char *one = bytes_of(good, &sizes[0]), *two = bytes_of(other, &sizes[1]);
+    assert_int_equal(sizes[0], sizes[1]);
+    assert_memory_equal(one, two, sizes[0]);
+    free(one);
+    free(two);
+    patina_cloud_destroy(cloud);
+}
+
+// What verifying reads: each section's first byte, and what the head says of itself.
+static void test_verified(void **state)
+{
+    (void)state;
+    size_t size;
+    unsigned char *data = bytes_of(good, &size);
+    char log[2048];
+    CHECK(patina_cloud_verify(good, NULL), NULL);
+    const size_t at[] = {size - SECTION, size - SECTION + 40, SUM_AT, SUM_AT + 8, SECTION, positions_at(data) + 5};
+    for (size_t i = 0; i < sizeof at / sizeof *at; i++) {
+        data[at[i]] ^= 1;
+        write_bytes(bad, data, size);
+        data[at[i]] ^= 1;
+        if (patina_cloud_verify(bad, NULL) != PATINA_ERROR_FORMAT)
+            support_die("byte %zu of %zu is not verified", at[i], size);
+        if (i < 2)
+            assert_non_null(strstr(support_message(NULL), "check sums of its pages"));
+    }
+    drain(log, sizeof log);
+    free(data);
+}
+
 // ---- the sums ----------------------------------------------------------------------------------------------------------
 
 // The sums themselves, or where they should be.
@@ -574,6 +644,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_sum),          cmocka_unit_test(test_left_out),
                                        cmocka_unit_test(test_rounds),       cmocka_unit_test(test_in_parts),
                                        cmocka_unit_test(test_cancelled),    cmocka_unit_test(test_below_cap),
+                                       cmocka_unit_test(test_not_written),  cmocka_unit_test(test_verified),
                                        cmocka_unit_test(test_damaged_sums), cmocka_unit_test(test_version_before)};
     return cmocka_run_group_tests(tests, make_files, remove_files);
 }

@@ -296,7 +296,8 @@ PATINA_API int patina_cloud_neighbourhoods(const patina_cloud *cloud, const pati
 
 // Writes the built cloud to a file, and opens it again by mapping: nothing is read but what is drawn, and the memory stays
 // the file's. A file of another version or machine, or a damaged one, is PATINA_ERROR_FORMAT: build the cloud anew. While a
-// cloud is open its file may be replaced (patina_cloud_save does), not written into.
+// cloud is open its file may be replaced (patina_cloud_save does), not written into. A cloud of a file with damaged pages is not saved
+// (PATINA_ERROR_FORMAT, which names them): they would pass as good.
 PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
 PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
 // Reads a saved cloud whole and compares the sum of each of its sections with that of the writing, which opening leaves out but
