@@ -33,8 +33,9 @@ int pt_gl_range_begin(struct pt_gl_device *d, size_t size)
     gl->GenBuffers(1, &range->name);
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, range->name);
     gl->BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)size, NULL, GL_STREAM_DRAW);
-    range->size = size;
-    return pt_gl_check(d, "making room for a range of points");
+    const int result = pt_gl_check(d, "making room for a range of points");
+    range->size = result == PATINA_OK ? size : 0; // a name without room is made anew
+    return result;
 }
 
 size_t pt_gl_range_room(const struct pt_gl_device *d, size_t size)

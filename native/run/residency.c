@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "residency.h"
 
+#include "page_check.h"
 #include "scene/mask.h"
 #include "scene/soft.h"
 
@@ -110,16 +111,19 @@ static int upload_all(struct patina_device *device, const struct patina_cloud *c
     return error;
 }
 
-// Where the driver has no memory for it whole, from now on range by range.
+// Where the driver has no memory for it whole, from now on range by range: PT_AGAIN, for what is bound already would lie there otherwise.
+// run/pager.h chooses ranges when the picture begins once more.
 static int upload(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
     const int error = upload_all(device, cloud, resident);
+    if (!error)
+        return PATINA_OK;
+    drop(device, resident);
+    resident->pages = atomic_load(&cloud->alive->pages) - 1; // nothing is there: whoever takes it next uploads it
     if (error != PATINA_ERROR_MEMORY || !device->copies || device->ranges.most)
         return error;
-    drop(device, resident);
     device->ranges.failed = pt_cloud_copied_bytes(cloud);
-    device->ranges.most = PT_RANGE_LEAST;
-    return upload_all(device, cloud, resident);
+    return PT_AGAIN;
 }
 
 // What changed since it was uploaded.
