@@ -40,7 +40,8 @@ static int choose_origin(struct ply_rows *rows)
         const uint64_t left = count - i - 1;
         const struct ply_element rest = window_of(rows, left < step - 1 ? left : step - 1);
         for (uint32_t k = 0; k < rows->points->properties; k++) {
-            targets[k].wrap = rows->header.properties[rows->points->first + k].type == PATINA_INT8; // colors that a writer called so
+            targets[k].wrap = rows->header.properties[rows->points->first + k].type ==
+                              PATINA_INT8; // colors that a writer called so
             for (size_t c = 0; c < 3; c++)
                 if (!strcmp(rows->header.properties[rows->points->first + k].name, names[c]))
                     targets[k] = (struct ply_target){.data = sample + 3 * n + c, .type = PATINA_FLOAT64, .step = 3, .scale = 1};
