@@ -36,6 +36,7 @@ void pt_condition_wake_one(struct pt_condition *condition);
 void pt_condition_wake_all(struct pt_condition *condition);
 
 void pt_thread_yield(void);
+void pt_pause(uint32_t milliseconds); // at least; the thread sleeps
 
 // For what is made at its first use: zero before. The others wait until `make` has returned.
 struct pt_once {

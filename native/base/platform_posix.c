@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // platform.h on Linux and macOS; what they do not share is in platform_linux.c and platform_macos.c.
-#include "pause.h"
 #include "platform.h"
 
 #include <dlfcn.h>

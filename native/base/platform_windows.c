@@ -2,7 +2,6 @@
 // platform.h on Windows 10 and later, with its own C library (UCRT). What takes paths takes them wide; no call here depends on the
 // process's code page.
 #define WIN32_LEAN_AND_MEAN
-#include "pause.h"
 #include "platform.h"
 
 #include <windows.h>

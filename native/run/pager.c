@@ -17,11 +17,7 @@ enum {
     LEAST = 64 << 20, // bytes, however little is free: less would be read over and over
     ROUNDS_A_CAP = 2, // the last round's pages and this one's
     FULL_EIGHTHS = 7, // from here on all is given back: threads read on meanwhile
-    // To look takes 2 to 5 microseconds. Of a file that lies in the system's memory threads take up to 50 GB a second: no more than an
-    // eighth of the cap between two looks, but where it is so small that they would do nothing else.
-    LOOK_LEAST = 20,
-    LOOK_MOST = 500,          // microseconds
-    BYTES_A_LOOK = 8 * 50000, // of the cap, a microsecond
+    TAKEN = 50000,    // bytes a microsecond, that threads take at most of a file that lies in the system's memory
 };
 
 // Clouds that several instances show count once.
@@ -147,15 +143,11 @@ static void make_room(struct pt_pager *pager, uint64_t more)
     atomic_fetch_add(&pager->returned, 1);
 }
 
-static uint64_t microseconds(void) { return (uint64_t)(1e3 * pt_milliseconds()); }
-
 // Of the device's threads: one looks, the others go on.
 static void look(void *context)
 {
     struct pt_pager *pager = context;
-    const uint64_t now = microseconds();
-    uint64_t again = atomic_load_explicit(&pager->again, memory_order_relaxed);
-    if (now >= again && atomic_compare_exchange_strong(&pager->again, &again, now + pager->pause))
+    if (pt_look_is_due(&pager->look))
         make_room(pager, pager->cap / 8 * (8 - FULL_EIGHTHS));
 }
 
@@ -224,9 +216,7 @@ int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const st
         return PATINA_OK;
     give_back(pager);
     pager->before = pt_file_memory();
-    const uint64_t pause = pager->cap / BYTES_A_LOOK;
-    pager->pause = pause < LOOK_LEAST ? LOOK_LEAST : pause < LOOK_MOST ? pause : LOOK_MOST;
-    atomic_store(&pager->again, 0);
+    pt_look_begin(&pager->look, pager->cap, TAKEN);
     device->ops->watch(device, look, pager);
     return PATINA_OK;
 }

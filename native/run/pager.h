@@ -4,17 +4,17 @@
 #ifndef PT_PAGER_H
 #define PT_PAGER_H
 
+#include "base/look.h"
 #include "plan/rounds.h"
 
 struct pt_pager {
     struct patina_device *device;
     const struct patina_scene *scene;
-    uint64_t cap;           // 0: all of it fits
-    uint64_t round;         // bytes that a round reads at most
-    uint64_t before;        // pt_file_memory with nothing held
-    uint64_t pause;         // microseconds between two looks
-    _Atomic uint64_t again; // when the next is due
-    _Atomic uint64_t held;  // most
+    uint64_t cap;    // 0: all of it fits
+    uint64_t round;  // bytes that a round reads at most
+    uint64_t before; // pt_file_memory with nothing held
+    struct pt_look look;
+    _Atomic uint64_t held; // most
     atomic_uint returned;
     uint64_t mapped, read;
     uint32_t rounds;

@@ -7,19 +7,13 @@
 enum {
     CAP_EIGHTHS = 5,   // of the memory, for what is mapped: from here on all is given back, while threads read on
     SMALL_EIGHTHS = 2, // of it, for what lies in memory all the same
-    // As pictures look at what they hold (run/pager.c); threads that write into fresh pages take no more than 2 GB a second.
-    LOOK_LEAST = 20,
-    LOOK_MOST = 500,         // microseconds
-    BYTES_A_LOOK = 8 * 4000, // of the cap, a microsecond
+    WRITTEN = 4000,    // bytes a microsecond, that threads write into fresh pages at most
 };
-
-static uint64_t microseconds(void) { return (uint64_t)(1e3 * pt_milliseconds()); }
 
 void pt_store_open(struct pt_store *store, const char *beside, const struct patina_cloud *cloud, uint64_t memory)
 {
     *store = (struct pt_store){.beside = beside, .cloud = cloud, .memory = memory, .cap = memory / 8 * CAP_EIGHTHS};
-    const uint64_t pause = store->cap / BYTES_A_LOOK;
-    store->pause = pause < LOOK_LEAST ? LOOK_LEAST : pause < LOOK_MOST ? pause : LOOK_MOST;
+    pt_look_begin(&store->look, store->cap, WRITTEN);
     store->before = pt_file_memory();
 }
 
@@ -77,11 +71,7 @@ int pt_store_is_small(const struct pt_store *store, uint64_t size)
 void pt_store_look(void *context)
 {
     struct pt_store *store = context;
-    if (!store)
-        return;
-    const uint64_t now = microseconds();
-    uint64_t again = atomic_load_explicit(&store->again, memory_order_relaxed);
-    if (now < again || !atomic_compare_exchange_strong(&store->again, &again, now + store->pause))
+    if (!store || !pt_look_is_due(&store->look))
         return;
     const uint64_t held = pt_file_memory();
     if (store->before && held <= store->before + store->cap) // where nobody knows, all there may be

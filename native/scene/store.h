@@ -6,7 +6,7 @@
 #define PT_STORE_H
 
 #include "cloud.h"
-#include "base/platform.h"
+#include "base/look.h"
 
 enum { PT_STORE_ARRAYS = 96 }; // an analysis has twelve, and two a view
 
@@ -15,10 +15,10 @@ struct pt_store {
     const char *beside;               // the file that they lie on the same disk with
     const struct patina_cloud *cloud; // mapped, or NULL
     uint64_t memory, cap;             // bytes: in all, and of what is mapped
-    uint64_t before, pause;           // held with nothing of it; microseconds between two looks
-    _Atomic uint64_t again;           // when the next is due
-    atomic_uint returned;             // how often all was given back
-    int error;                        // of the system, where an array could not be made
+    uint64_t before;                  // held with nothing of it
+    struct pt_look look;
+    atomic_uint returned; // how often all was given back
+    int error;            // of the system, where an array could not be made
     struct pt_stored {
         void *pages;
         size_t size;

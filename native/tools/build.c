@@ -2,7 +2,6 @@
 // patina convert IN OUT.cloud: builds the cloud on the disk from windows of the file, and analyses it there. Whoever is killed leaves no
 // file of that name but the one that was there before; the next run begins anew.
 #include "tool.h"
-#include "base/pause.h"
 
 #include <stdatomic.h>
 #include <stdlib.h>

@@ -4,7 +4,7 @@ mesh. check_points and check_materials have their simpler kinds."""
 
 import bpy
 import numpy as np
-from check_points import grid, pixel, stats_line
+from check_points import grid, node_tree, pixel, stats_line
 from check_splats import size_of
 from harness import Skip, add_points, check, check_close, drawn, linear, new_scene, render, reports
 from mathutils import Matrix
@@ -15,15 +15,8 @@ class Nodes:
     """A tree on an object; its first node is the group's input."""
 
     def __init__(self, obj):
-        self.tree = tree = bpy.data.node_groups.new("points", 'GeometryNodeTree')
-        if hasattr(tree, "interface"):
-            for direction in ('INPUT', 'OUTPUT'):
-                tree.interface.new_socket("Geometry", in_out=direction, socket_type='NodeSocketGeometry')
-        else:
-            tree.inputs.new('NodeSocketGeometry', "Geometry")
-            tree.outputs.new('NodeSocketGeometry', "Geometry")
+        self.tree = tree = node_tree(obj, "points")
         self.last, self._end = tree.nodes.new('NodeGroupInput'), tree.nodes.new('NodeGroupOutput')
-        obj.modifiers.new("points", 'NODES').node_group = tree
 
     def node(self, kind, properties=None, **values):
         """Beside the chain. values: of inputs, by their names with _ for a space; a socket is linked."""

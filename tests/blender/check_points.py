@@ -164,19 +164,25 @@ def stats_line():
     return harness.stats[-1]
 
 
-def mesh_to_points(obj):
-    """A geometry node tree that turns an object's vertices into a point cloud."""
-    tree = bpy.data.node_groups.new("to points", 'GeometryNodeTree')
+def node_tree(obj, name):
+    """A geometry node tree on an object, with a geometry in and out."""
+    tree = bpy.data.node_groups.new(name, 'GeometryNodeTree')
     if hasattr(tree, "interface"):
         for direction in ('INPUT', 'OUTPUT'):
             tree.interface.new_socket("Geometry", in_out=direction, socket_type='NodeSocketGeometry')
     else:
         tree.inputs.new('NodeSocketGeometry', "Geometry")
         tree.outputs.new('NodeSocketGeometry', "Geometry")
+    obj.modifiers.new(name, 'NODES').node_group = tree
+    return tree
+
+
+def mesh_to_points(obj):
+    """Geometry nodes that turn an object's vertices into a point cloud."""
+    tree = node_tree(obj, "to points")
     nodes = [tree.nodes.new(kind) for kind in ('NodeGroupInput', 'GeometryNodeMeshToPoints', 'NodeGroupOutput')]
     for first, second in zip(nodes, nodes[1:]):
         tree.links.new(first.outputs[0], second.inputs[0])
-    obj.modifiers.new("to points", 'NODES').node_group = tree
 
 
 def test_geometry_nodes_points():

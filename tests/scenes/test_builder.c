@@ -4,6 +4,8 @@
 #include "clouds.h"
 #include "support.h"
 
+#include "folder.h" // behind cmocka.h
+
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -33,25 +35,6 @@ static const char *at(const char *name)
     snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
     return path[turn];
 }
-
-static int is_there(const char *path)
-{
-    struct stat status;
-    return !stat(path, &status);
-}
-
-#ifndef _WIN32
-static uint32_t files_left(void)
-{
-    char command[300], text[32] = "";
-    snprintf(command, sizeof command, "ls -A %s | wc -l", folder);
-    FILE *list = popen(command, "r");
-    assert_non_null(list);
-    assert_non_null(fgets(text, sizeof text, list));
-    pclose(list);
-    return (uint32_t)atoi(text);
-}
-#endif
 
 // ---- the clouds ----------------------------------------------------------------------------------------------------------
 
@@ -138,31 +121,6 @@ static int build(const char *path, const patina_cloud_desc *desc, const patina_b
         code = patina_builder_end(builder, NULL);
     patina_builder_destroy(builder);
     return code;
-}
-
-static void *bytes_of(const char *path, size_t *size)
-{
-    FILE *stream = fopen(path, "rb");
-    assert_non_null(stream);
-    fseek(stream, 0, SEEK_END);
-    *size = (size_t)ftell(stream);
-    rewind(stream);
-    void *data = malloc(*size + 1);
-    assert_int_equal(fread(data, 1, *size, stream), *size);
-    fclose(stream);
-    return data;
-}
-
-static void assert_same_file(const char *path, const char *other)
-{
-    size_t size, other_size;
-    char *data = bytes_of(path, &size), *wanted = bytes_of(other, &other_size);
-    assert_int_equal(size, other_size);
-    for (size_t i = 0; i < size; i++)
-        if (data[i] != wanted[i])
-            support_die("byte %zu of %zu differs", i, size);
-    free(data);
-    free(wanted);
 }
 
 // ---- the same bytes ------------------------------------------------------------------------------------------------------
@@ -439,7 +397,7 @@ static void test_full_disk(void **state)
     struct columns all = columns_of(FEW, 0.0);
     const patina_builder_desc how = {.struct_size = sizeof how, .memory = 1 << 28};
     remove(at("built"));
-    const uint32_t files = files_left();
+    const uint32_t files = files_in(folder);
     signal(SIGXFSZ, SIG_IGN);
     struct rlimit before, less;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
@@ -453,7 +411,7 @@ static void test_full_disk(void **state)
         assert_int_equal(code, PATINA_ERROR_FILE);
         assert_non_null(strstr(support_message(NULL), "cannot be written"));
         assert_false(is_there(at("built")));
-        assert_int_equal(files_left(), files);
+        assert_int_equal(files_in(folder), files);
     }
     columns_free(&all);
 }
@@ -471,7 +429,7 @@ static void test_killed(void **state)
     CHECK(build(at("wanted"), &all.desc, &how, 70000), NULL);
     clock_gettime(CLOCK_MONOTONIC, &end);
     const double takes = (double)(end.tv_sec - begin.tv_sec) * 1e6 + (double)(end.tv_nsec - begin.tv_nsec) / 1e3;
-    const uint32_t files = files_left();
+    const uint32_t files = files_in(folder);
     uint32_t finished = 0;
     for (int i = 0; i < KILLS; i++) {
         remove(at("built")); // what the one before left beside stays
@@ -485,11 +443,11 @@ static void test_killed(void **state)
             assert_same_file(at("built"), at("wanted"));
             finished++;
         }
-        assert_true(files_left() <= files + 1 + (uint32_t)is_there(at("built")));
+        assert_true(files_in(folder) <= files + 1 + (uint32_t)is_there(at("built")));
         if (i % 4 == 0) { // and anew: nothing of the killed one is left or does harm
             CHECK(build(at("built"), &all.desc, &how, 50000), NULL);
             assert_same_file(at("built"), at("wanted"));
-            assert_int_equal(files_left(), files + 1);
+            assert_int_equal(files_in(folder), files + 1);
         }
     }
     print_message("%u of %d were done before they were killed\n", finished, KILLS);
@@ -505,7 +463,7 @@ static void test_at_once(void **state)
     pid_t children[3];
     CHECK(build(at("wanted"), &all.desc, &how, 70000), NULL);
     remove(at("built"));
-    const uint32_t files = files_left();
+    const uint32_t files = files_in(folder);
     for (int i = 0; i < 3; i++)
         if (!(children[i] = fork()))
             _exit(build(at("built"), &all.desc, &how, 70000));
@@ -515,7 +473,7 @@ static void test_at_once(void **state)
         assert_int_equal(status, 0);
         assert_same_file(at("built"), at("wanted"));
     }
-    assert_int_equal(files_left(), files + 1);
+    assert_int_equal(files_in(folder), files + 1);
     columns_free(&all);
 }
 
@@ -524,11 +482,7 @@ static void test_at_once(void **state)
 static int make_folder(void **state)
 {
     (void)state;
-#ifdef _WIN32
-    return mkdir(folder);
-#else
-    return !mkdtemp(folder);
-#endif
+    return make_folder_of(folder);
 }
 
 static int remove_folder(void **state)

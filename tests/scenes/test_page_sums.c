@@ -4,6 +4,8 @@
 #include "clouds.h"
 #include "support.h"
 
+#include "folder.h" // behind cmocka.h
+
 #include "base/platform.h"
 #include "run/page_check.h"
 #include "run/pager.h"
@@ -23,19 +25,6 @@ enum { VERSION_AT = 8, SIZE_AT = 32, BYTES_OF_CHUNKS_AT = 12, CHUNKS_AT = 20, SU
 enum { PARTS = 2, CAP = 400000, MANY = 600000, CAP_OF_MANY = 2 << 20, BESIDE = 512 << 10 };
 
 static char good[80], bad[80], other[80], keys[PARTS][80];
-
-static unsigned char *bytes_of(const char *path, size_t *size)
-{
-    FILE *stream = fopen(path, "rb");
-    assert_non_null(stream);
-    fseek(stream, 0, SEEK_END);
-    *size = (size_t)ftell(stream);
-    rewind(stream);
-    unsigned char *data = malloc(*size + 1);
-    assert_int_equal(fread(data, 1, *size, stream), *size);
-    fclose(stream);
-    return data;
-}
 
 static void write_bytes(const char *path, const void *data, size_t size)
 {

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "files.h"
+#include "folder.h"
 
 #include <stdlib.h>
 #include <unistd.h>
@@ -254,21 +255,6 @@ static void test_windows(void **state)
 
 // ---- the same cloud ------------------------------------------------------------------------------------------------------
 
-static void expect_same_files(const char *what)
-{
-    FILE *a = fopen(made, "rb"), *b = fopen(other, "rb");
-    assert_true(a && b);
-    for (long i = 0;; i++) {
-        const int one = fgetc(a), two = fgetc(b);
-        if (one != two)
-            fail_msg("%s: byte %ld differs", what, i);
-        if (one == EOF)
-            break;
-    }
-    fclose(a);
-    fclose(b);
-}
-
 static int build(uint64_t size, const char *scalar, char *message, size_t room)
 {
     patina_builder *builder = NULL;
@@ -323,7 +309,7 @@ static void test_built(void **state)
         patina_cloud_destroy(cloud);
         if (build(777, heated ? "heat" : NULL, message, sizeof message))
             fail_msg("%s: %s", kinds[k].what, message);
-        expect_same_files(kinds[k].what);
+        assert_same_file(made, other);
     }
 }
 

@@ -6,6 +6,8 @@
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 
+#include "folder.h" // behind cmocka.h
+
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -254,27 +256,6 @@ static void test_same(void **state)
 
 // ---- files -----------------------------------------------------------------------------------------------------------------
 
-static int is_there(const char *path)
-{
-    struct stat status;
-    return !stat(path, &status);
-}
-
-static void assert_same_file(const char *path, const char *other)
-{
-    FILE *a = fopen(path, "rb"), *b = fopen(other, "rb");
-    static char one[1 << 16], two[1 << 16];
-    size_t some;
-    assert_true(a && b);
-    do {
-        some = fread(one, 1, sizeof one, a);
-        assert_int_equal(fread(two, 1, sizeof two, b), some);
-        assert_memory_equal(one, two, some);
-    } while (some);
-    fclose(a);
-    fclose(b);
-}
-
 static void save_plain(const struct scan *scan, int which)
 {
     patina_cloud *cloud = cloud_of(scan, which == STATUE);
@@ -340,17 +321,6 @@ static void test_refused(void **state)
 
 #ifndef _WIN32
 
-static uint32_t files_left(void)
-{
-    char command[300], text[32] = "";
-    snprintf(command, sizeof command, "ls -A %s | wc -l", folder);
-    FILE *list = popen(command, "r");
-    assert_non_null(list);
-    assert_non_null(fgets(text, sizeof text, list));
-    pclose(list);
-    return (uint32_t)atoi(text);
-}
-
 // Files may not grow beyond some size: while arrays are made, and while the file is written. Mapped pages that the disk has no room for
 // would end the process; they are asked for before.
 static void test_full_disk(void **state)
@@ -360,7 +330,7 @@ static void test_full_disk(void **state)
     struct rlimit before, less;
     save_plain(&scan, PLANE);
     remove(at("found"));
-    const uint32_t files = files_left();
+    const uint32_t files = files_in(folder);
     signal(SIGXFSZ, SIG_IGN);
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
     static const rlim_t limits[] = {100000, 3000000, 6000000};
@@ -372,7 +342,7 @@ static void test_full_disk(void **state)
         assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
         assert_int_equal(code, PATINA_ERROR_FILE);
         assert_false(is_there(at("found")));
-        assert_int_equal(files_left(), files);
+        assert_int_equal(files_in(folder), files);
     }
     scan_free(&scan);
 }
@@ -388,7 +358,7 @@ static void test_killed(void **state)
     CHECK(patina_cloud_analyse_file(at("plain"), &desc, LITTLE, at("wanted"), NULL), NULL);
     const double takes = 1e3 * (pt_milliseconds() - begin);
     remove(at("found"));
-    const uint32_t files = files_left();
+    const uint32_t files = files_in(folder);
     uint32_t finished = 0;
     for (int i = 0; i < KILLS; i++) {
         const pid_t child = fork();
@@ -402,11 +372,11 @@ static void test_killed(void **state)
             remove(at("found"));
             finished++;
         }
-        assert_true(files_left() <= files + 1); // the half file; what it kept of points went with it
+        assert_true(files_in(folder) <= files + 1); // the half file; what it kept of points went with it
     }
     CHECK(patina_cloud_analyse_file(at("plain"), &desc, LITTLE, at("found"), NULL), NULL); // and anew
     assert_same_file(at("found"), at("wanted"));
-    assert_int_equal(files_left(), files + 1);
+    assert_int_equal(files_in(folder), files + 1);
     print_message("%u of %d were done before they were killed\n", finished, KILLS);
     scan_free(&scan);
 }
@@ -416,11 +386,7 @@ static void test_killed(void **state)
 static int make_folder(void **state)
 {
     (void)state;
-#ifdef _WIN32
-    return mkdir(folder);
-#else
-    return !mkdtemp(folder);
-#endif
+    return make_folder_of(folder);
 }
 
 static int remove_folder(void **state)

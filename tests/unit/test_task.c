@@ -12,6 +12,8 @@
 
 #include <cmocka.h>
 
+#include "folder.h"
+
 enum { POINTS = 400000, SIDE = 64 };
 
 static float points[POINTS][3];
@@ -255,21 +257,6 @@ static void test_files(void **state)
     patina_cloud_destroy(cloud);
 }
 
-static void assert_same_file(const char *path, const char *other)
-{
-    static char one[1 << 16], two[1 << 16];
-    FILE *a = fopen(path, "rb"), *b = fopen(other, "rb");
-    size_t some;
-    assert_true(a && b);
-    do {
-        some = fread(one, 1, sizeof one, a);
-        assert_int_equal(fread(two, 1, sizeof two, b), some);
-        assert_memory_equal(one, two, some);
-    } while (some);
-    fclose(a);
-    fclose(b);
-}
-
 // A saved cloud is analysed to another file: as the call itself does it, below a cap and with room, with stations; errors and a cancel
 // leave nothing there.
 static void test_analyses_files(void **state)
@@ -278,11 +265,10 @@ static void test_analyses_files(void **state)
     enum { LITTLE = 16 << 20 };
 #ifdef _WIN32
     char folder[] = "patina-task-files";
-    assert_int_equal(mkdir(folder), 0);
 #else
     char folder[] = "/tmp/patina-task-XXXXXX";
-    assert_non_null(mkdtemp(folder));
 #endif
+    assert_int_equal(make_folder_of(folder), 0);
     char from[64], to[64], wanted[64], none[64];
     static uint8_t station[POINTS];
     static const double stations[2][3] = {{0.5, 0.5, 9.0}, {0.5, 0.5, -9.0}};
