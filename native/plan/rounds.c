@@ -118,7 +118,8 @@ uint32_t pt_count_copies(const struct pt_chunk_list *lists, uint32_t count, uint
 {
     uint32_t ranges = 0;
     *bytes = 0;
-    for (const struct pt_chunk_list *list = lists; list < lists + count; list++) {
+    for (uint32_t i = 0; i < count; i++) {
+        const struct pt_chunk_list *const list = &lists[i];
         const uint64_t facing = list->copied - (list->culled ? 4 : 0); // without surfels
         for (uint32_t c = 0; c < list->count; c++)
             *bytes += list->chunks[c].padded * (list->chunks[c].cull ? list->copied : facing);
