@@ -72,35 +72,41 @@ static void make_translucent(const struct tail *tail, const struct pt_cpu_call *
     }
 }
 
+// What all pixels of the row share is copied first: stores to rows and planes may change it where it lies, for all that the compiler
+// knows, and it would be read, and computed from, once more for each vector.
 static inline __attribute__((always_inline)) void light_row(const struct tail *tail, struct walk *walk,
                                                             const struct pt_cpu_call *call, int32_t y, int plain)
 {
-    const struct shade_args *args = call->arguments;
-    const struct light_view *lights = PT_DATA(call, shade, lights);
-    const uint32_t *shadows = PT_DATA(call, shade, shadows);
-    const struct view_args *view = tail->planes.view;
-    const struct pt_color_row *out = &walk->shaded[slot(tail, y)];
+    const struct shade_args args = *(const struct shade_args *)call->arguments;
+    const struct pt_lights lights = pt_lights_of(&args, PT_DATA(call, shade, lights), PT_DATA(call, shade, shadows));
+    const struct pt_planes planes = tail->planes;
+    const struct pt_color_row out = walk->shaded[slot(tail, y)];
+    const int shows_normals = tail->shows_normals, shows_shadow = tail->extract && tail->extract->shadow;
+    float *shown[5];
     const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
-    const int reach = (int)args->blend;
+    const int reach = (int)args.blend;
+    for (uint32_t k = 0; k < 5; k++)
+        shown[k] = walk->shown[slot(tail, y)][k];
     for (int32_t k = -reach; k <= reach; k++)
         around[reach + k] = seen_row(tail, walk, y + k);
-    const uint8_t *one_layer = reach == 1 ? around[reach]->flat : walk->wide;
-    for (uint32_t x = around[reach]->first; x < around[reach]->end; x += PT_LANES) {
-        vf color[3] = {vf_load(out->color[0] + x), vf_load(out->color[1] + x), vf_load(out->color[2] + x)}, normal[3];
+    const struct pt_seen_row own = *around[reach];
+    const uint8_t *one_layer = reach == 1 ? own.flat : walk->wide;
+    for (uint32_t x = own.first; x < own.end; x += PT_LANES) {
+        vf color[3] = {vf_load(out.color[0] + x), vf_load(out.color[1] + x), vf_load(out.color[2] + x)}, normal[3];
+        const size_t at = (size_t)y * planes.view->width + x;
         vi id;
-        vm ours = pt_of_instance(tail->planes.keys + (size_t)y * view->width + x, &args->instance,
-                                 pt_lanes_left(x, view->width), &id);
+        vm ours = pt_of_instance(planes.keys + at, &args.instance, pt_lanes_left(x, args.view.width), &id);
         if (!vm_bits(ours))
             continue;
         float *const *blended = reach && reach == tail->reach && one_layer[x / PT_LANES] ? walk->blended : NULL;
-        vf share = pt_shade_pixels(args, &tail->planes, around, tail->weights, blended, lights, shadows, x, (uint32_t)y, id,
-                                   ours, plain, color, normal);
+        vf share = pt_shade_pixels(&args, &planes, around, tail->weights, blended, &lights, x, (uint32_t)y, id, ours, plain,
+                                   color, normal);
         for (uint32_t k = 0; k < 3; k++)
-            vf_store_where(out->color[k] + x, color[k], ours);
-        for (uint32_t k = 0; k < 3 && tail->shows_normals; k++)
-            vf_store_where(walk->shown[slot(tail, y)][k] + x, normal[k], ours);
-        if (tail->extract && tail->extract->shadow)
-            vf_store_where(walk->shown[slot(tail, y)][4] + x, share, ours);
+            vf_store_where(out.color[k] + x, color[k], ours);
+        for (uint32_t k = 0; k < 3 && shows_normals; k++)
+            vf_store_where(shown[k] + x, normal[k], ours);
+        if (shows_shadow)
+            vf_store_where(shown[4] + x, share, ours);
     }
 }
 

@@ -30,6 +30,8 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
     float *shading = PT_DATA(shade->call, shade, shading), *colors = PT_DATA(shade->call, shade, color),
           *arrived = PT_DATA(shade->call, shade, arrived);
     const uint64_t *keys = shade->planes.keys + (size_t)y * args->view.width;
+    const struct pt_lights lights = pt_lights_of(args, PT_DATA(shade->call, shade, lights),
+                                                 PT_DATA(shade->call, shade, shadows));
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         if (args->instance.color_format)
             pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, PT_DATA(shade->call, shade, colors),
@@ -46,8 +48,8 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         pt_albedo(&args->instance, PT_DATA(shade->call, shade, colors), id, source, ours, color);
         if (pt_recolors(args))
             pt_recolor(args, PT_DATA(shade->call, shade, ramps), x, y, vf_load(around[args->blend]->z + x), ours, color);
-        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, PT_DATA(shade->call, shade, lights),
-                                   PT_DATA(shade->call, shade, shadows), x, y, id, ours, 0, color, normal);
+        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, &lights, x, y, id, ours, 0, color,
+                                   normal);
         normal[3] = color[3] = pt_opacity(&args->instance, PT_DATA(shade->call, shade, colors),
                                           PT_DATA(shade->call, shade, opacities), id, source, ours);
         for (int k = 0; k < 3; k++)

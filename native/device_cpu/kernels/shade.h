@@ -105,12 +105,22 @@ static inline vf pt_power(vf x, uint32_t exponent)
     return result;
 }
 
-// The light, and shadow words: those of a light lie `stride` apart from the next one's.
+// The light, what comes from all around alike, and shadow words: those of a light lie `stride` apart from the next one's.
 struct pt_lights {
     const struct light_view *view;
     const uint32_t *words;
     size_t stride;
+    float around[3];
 };
+
+static inline struct pt_lights pt_lights_of(const struct shade_args *args, const struct light_view *view, const uint32_t *words)
+{
+    const size_t pixels = (size_t)args->view.width * args->view.height;
+    struct pt_lights lights = {.view = view, .words = words, .stride = args->of_pixels ? pixels : args->instance.id_count};
+    for (int k = 0; k < 3 && args->instance.lit; k++)
+        lights.around[k] = args->instance.ambient * view->world[k];
+    return lights;
+}
 
 // The share of a light, the cast-th of those that cast shadows, that arrives at points, by their words [D 6].
 static inline vf pt_arrives(const struct shade_args *args, const struct pt_lights *lights, uint32_t cast, vi at, vm ours)
@@ -243,7 +253,7 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
             pt_add_light(instance, light, light->points[j], share, &point, diffuse, specular);
     }
     for (int k = 0; k < 3; k++) {
-        vf light = vf_set(instance->ambient * lights->view->world[k]);
+        vf light = vf_set(lights->around[k]);
         if (args->directed)
             light = vf_set(instance->ambient) * pt_ambient(lights->view->ambient, k, point.n);
         light = light + vf_set(instance->diffuse) * diffuse[k];
@@ -261,9 +271,9 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
 // the casting lights that arrives.
 static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes,
                                                                 const struct pt_seen_row *const *around, const float *weights,
-                                                                float *const *blended, const struct light_view *view,
-                                                                const uint32_t *shadows, uint32_t x, uint32_t y, vi id, vm ours,
-                                                                int plain, vf color[3], vf normal[3])
+                                                                float *const *blended, const struct pt_lights *lights,
+                                                                uint32_t x, uint32_t y, vi id, vm ours, int plain, vf color[3],
+                                                                vf normal[3])
 {
     size_t at = (size_t)y * args->view.width + x;
     const struct pt_seen_row *own = around[args->blend];
@@ -278,7 +288,7 @@ static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct sha
             for (int k = 0; k < 3 && blended; k++)
                 sum[k] = vf_load(blended[k] + x);
             if (!blended)
-                pt_blend_sum(&(struct pt_blend){&args->view, (int)args->blend, weights, around}, x, filled, sum);
+                pt_blend_sum(&(struct pt_blend){planes->view, (int)args->blend, weights, around}, x, filled, sum);
             pt_blend_normals(sum, filled, normal);
         }
     }
@@ -286,9 +296,7 @@ static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct sha
         return vf_set(1.0f);
     vf ray[2];
     vf_ray(&args->view, x, y, ray);
-    const size_t pixels = (size_t)args->view.width * args->view.height;
-    const struct pt_lights lights = {view, shadows, args->of_pixels ? pixels : args->instance.id_count};
-    return pt_phong(args, plain, &lights, ray, args->of_pixels ? pt_source(planes, at) : id, ours, vf_load(own->z + x), normal,
+    return pt_phong(args, plain, lights, ray, args->of_pixels ? pt_source(planes, at) : id, ours, vf_load(own->z + x), normal,
                     color);
 }
 
