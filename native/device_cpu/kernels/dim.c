@@ -31,15 +31,12 @@ static inline vi loss_of(const struct dim *dim, const struct chunk_view *chunk, 
 {
     const struct dim_args *args = dim->args;
     const struct view_args *view = &args->view;
-    const float *window = args->window;
     const vf one = vf_set(1.0f), half = vf_set(0.5f);
     vf p[3], at[3];
     pt_load_points(positions, chunk->padded, i, p);
     // 1. project
     pt_project(view, chunk, p, at);
-    vm inside = vm_and(vm_and(vf_le(vf_set(window[0]), at[0]), vf_lt(at[0], vf_set(window[2]))),
-                       vm_and(vf_le(vf_set(window[1]), at[1]), vf_lt(at[1], vf_set(window[3]))));
-    inside = vm_and(lanes, vm_and(inside, vf_le(vf_set(view->z_near), at[2])));
+    const vm inside = pt_in_window(view, args->window, at, lanes);
     if (!vm_bits(inside))
         return vi_set(0);
     const vf deep = vf_select(inside, clamped((at[2] - vf_set(args->veil_from)) * vf_set(args->veil_scale), args->veils),
@@ -72,10 +69,8 @@ static uint32_t dim_chunk(const struct dim *dim, const struct chunk_view *chunk)
     const int whole = args->alone || args->close, all = args->close || args->compare;
     for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(i, chunk->count));
-        if (args->marked) {
-            const vi slot = vi_add(vi_set(chunk->first + i), vi_lanes());
-            lanes = vm_and(lanes, vm_not(vi_eq(vi_and(vi_gather_bytes(marks, slot, lanes), vi_set(255)), vi_set(0))));
-        }
+        if (args->marked)
+            lanes = pt_marked(marks, chunk->first + i, lanes);
         if (!vm_bits(lanes))
             continue;
         uint32_t losses[PT_LANES];

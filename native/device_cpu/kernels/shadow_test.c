@@ -31,13 +31,10 @@ struct queue {
 static struct fall fall_of(const struct shadow_test *test, const struct chunk_view *chunk, const vf p[3], vm lanes)
 {
     const struct view_args *view = &test->args.view;
-    const float *window = test->args.window;
     vf at[3];
     pt_project(view, chunk, p, at);
     struct fall f = {.z = at[2], .at = {at[0], at[1]}};
-    vm inside = vm_and(vm_and(vf_le(vf_set(window[0]), f.at[0]), vf_lt(f.at[0], vf_set(window[2]))),
-                       vm_and(vf_le(vf_set(window[1]), f.at[1]), vf_lt(f.at[1], vf_set(window[3]))));
-    inside = vm_and(lanes, vm_and(inside, vf_le(vf_set(view->z_near), f.z)));
+    const vm inside = pt_in_window(view, test->args.window, at, lanes);
     f.column = vi_sub(vf_int(vf_floor(f.at[0])), vi_set((uint32_t)view->origin_x));
     f.row = vi_sub(vf_int(vf_floor(f.at[1])), vi_set((uint32_t)view->origin_y));
     f.texel = vi_add(vi_mul(f.row, vi_set(view->width)), f.column);
@@ -196,11 +193,8 @@ static void fill_queue(const struct shadow_test *test, const struct chunk_view *
     queue->count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(i, last));
-        if (args->marked) {
-            vi slot = vi_add(vi_set(chunk->first + i), vi_lanes());
-            vi mark = vi_and(vi_gather_bytes(marks, slot, lanes), vi_set(255));
-            lanes = vm_and(lanes, vm_not(vi_eq(mark, vi_set(0))));
-        }
+        if (args->marked)
+            lanes = pt_marked(marks, chunk->first + i, lanes);
         if (!vm_bits(lanes))
             continue;
         vf p[3];

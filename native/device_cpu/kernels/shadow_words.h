@@ -12,6 +12,21 @@ static inline uint32_t pt_shadow_share(uint32_t a, uint32_t b)
     return (product + (product >> 8)) >> 8;
 }
 
+// Those of `lanes` whose points, from `slot` on, have a mark.
+static inline vm pt_marked(const uint8_t *marks, uint32_t slot, vm lanes)
+{
+    const vi mark = vi_and(vi_gather_bytes(marks, vi_add(vi_set(slot), vi_lanes()), lanes), vi_set(255));
+    return vm_and(lanes, vm_not(vi_eq(mark, vi_set(0))));
+}
+
+// Those of `lanes` that fall into the window and do not lie before the map; at: x, y, z.
+static inline vm pt_in_window(const struct view_args *view, const float window[4], const vf at[3], vm lanes)
+{
+    const vm inside = vm_and(vm_and(vf_le(vf_set(window[0]), at[0]), vf_lt(at[0], vf_set(window[2]))),
+                             vm_and(vf_le(vf_set(window[1]), at[1]), vf_lt(at[1], vf_set(window[3]))));
+    return vm_and(lanes, vm_and(inside, vf_le(vf_set(view->z_near), at[2])));
+}
+
 // What a map takes goes into the word; whole: it is the sample's last. Returns whether the samples so far differ.
 static inline uint32_t pt_shadow_note(uint32_t *word, uint32_t loss, int whole, uint32_t samples)
 {
