@@ -62,7 +62,7 @@ void pt_plan_sift(struct pt_builder *builder)
                                      : "no clip, hidden class, hidden shape, mask, field or hidden scan in view");
         return;
     }
-    for (uint32_t i = 0; i < plan->instance_count + plan->soft_count && builder->layer <= 1;
+    for (uint32_t i = 0; i < plan->instance_count + plan->soft.count && builder->layer <= 1;
          i++) { // the words serve every layer
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunks_cut)

@@ -11,7 +11,7 @@
 // What no pixel's layer distance is below, whatever the rounding; world units.
 static float least_distance(const struct pt_plan *plan)
 {
-    float least = plan->triangles ? 0.0f : INFINITY; // a mesh has but its footprint
+    float least = plan->mesh.triangles ? 0.0f : INFINITY; // a mesh has but its footprint
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct instance_args *args = &plan->instances[i].args;
         const patina_cloud_info *info = &plan->instances[i].instance->cloud->info;
@@ -37,7 +37,7 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
 {
     struct pt_plan *plan = builder->plan;
     struct fill_args args = {.view = pt_view_at(plan, level),
-                             .phases = PT_FILL_BACKGROUND | (level && plan->discs_count ? 0 : PT_FILL_OCCLUDED),
+                             .phases = PT_FILL_BACKGROUND | (level && plan->discs.count ? 0 : PT_FILL_OCCLUDED),
                              .iterations = plan->iterations,
                              .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
                              .refined = plan->quality == PATINA_QUALITY_REFINED,
@@ -48,7 +48,7 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
     if (plan->reaches) {
         args.reach = REACH;
         args.disc_reach = DISC_REACH;
-        args.discs_first = plan->discs_first;
+        args.discs_first = plan->discs.first;
     }
     PT_REASON(PT_ADD(builder, fill, args,
                      {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
@@ -84,7 +84,7 @@ static void plan_pyramid(struct pt_builder *builder)
                                  .refined = plan->quality == PATINA_QUALITY_REFINED,
                                  .least = least_distance(plan),
                                  .least_share = least_share(plan, level - 1),
-                                 .background = plan->discs_count > 0,
+                                 .background = plan->discs.count > 0,
                                  .from_width = plan->view.width};
         PT_REASON(PT_ADD(builder, push, args,
                          {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),

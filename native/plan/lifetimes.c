@@ -55,7 +55,7 @@ static void use_step(struct builder_of_lives *b, struct pt_step *step, const str
         use(b, step->plane.which, step->plane.index);
     if (step->of == PT_STEP_COVERED)
         use(b, PT_PLANE_TILES, PT_TILE_LEVEL);
-    if (step->of == PT_STEP_LIGHT && plan->mesh_shadows) {
+    if (step->of == PT_STEP_LIGHT && plan->mesh.shadows) {
         use(b, PT_PLANE_MESH_SHOWN, 0);
         use(b, PT_PLANE_MESH_PLACES, 0);
         use(b, PT_PLANE_MESH_WORDS, 0);
@@ -135,14 +135,14 @@ static uint64_t rounded_up(uint64_t count)
 void pt_plan_set_bins(struct pt_plan *plan, uint32_t threads, uint64_t had)
 {
     const uint32_t bins = pt_bins_of(&plan->view);
-    plan->disc_bins = 0;
+    plan->discs.bins = 0;
     if (!threads || !pt_plan_draws(plan, PT_AS_DISCS))
         return;
-    const double full = 1.25 * plan->disc_entries / PT_BIN_DISCS, begun = (double)threads * (bins + PT_BIN_SHARE);
+    const double full = 1.25 * plan->discs.entries / PT_BIN_DISCS, begun = (double)threads * (bins + PT_BIN_SHARE);
     const size_t most = (size_t)16 * UINT32_MAX; // what is wanted beyond is refused when it is asked for
     size_t bytes = pt_bins_bytes(bins, threads, rounded_up((uint64_t)fmin(full + begun, 4e9)));
     bytes = had > bytes && had / 4 < bytes ? (size_t)had : bytes;
-    plan->disc_bins = (uint32_t)(((bytes < most ? bytes : most) + 15) / 16);
+    plan->discs.bins = (uint32_t)(((bytes < most ? bytes : most) + 15) / 16);
 }
 
 int pt_plan_share_planes(struct pt_plan *plan, const struct pt_abilities *abilities, int apart)

@@ -128,7 +128,7 @@ static void plan_ink(struct pt_builder *builder, struct ink_args args, const str
         args.instance = instance->args;
         add_ink(builder, &args, pt_buffer_of(PT_COLORS, i), targets);
     }
-    if (of_points && plan->triangles) { // behind the points' ids; in white
+    if (of_points && plan->mesh.triangles) { // behind the points' ids; in white
         args.view = all.view;
         args.instance = (struct instance_args){.id_base = (uint32_t)builder->scene->points,
                                                .id_count = (uint32_t)builder->scene->triangles,

@@ -112,8 +112,8 @@ static void add_dim(struct tests *tests, uint32_t instance, const struct shadow_
                             .samples = asked->samples,
                             .compare = asked->compare,
                             .marked = asked->marked,
-                            .veils = map->veils,
-                            .veil_from = map->soft_depths[0],
+                            .veils = map->soft.veils,
+                            .veil_from = map->soft.depths[0],
                             .veil_scale = 1.0f / pt_veil_deep(map)};
     memcpy(args.window, asked->window, sizeof args.window);
     const struct pt_ref refs[] = {pt_plane_at(PT_PLANE_VEIL, 0),
@@ -273,12 +273,12 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
         return error;
     pt_handle_init(&view.handle);
     if (group->soft) {
-        map->veils = pt_veil_slabs(&view);
+        map->soft.veils = pt_veil_slabs(&view);
         error = pt_plan_view(&view, map);
     } else {
         error = pt_plan_depth(&builder);
     }
-    if (!error && (group->soft ? map->soft_part_count > 0 : pt_plan_shows(map))) {
+    if (!error && (group->soft ? map->soft.part_count > 0 : pt_plan_shows(map))) {
         if (group->soft) {
             pt_plan_no_veil(&builder);
             pt_plan_veil(&builder);

@@ -12,7 +12,7 @@ static int in_view(const struct pt_plan_mesh *mesh) { return mesh->rect[0] < mes
 static void plan_raster(struct pt_builder *builder, uint32_t i)
 {
     const struct pt_plan *plan = builder->plan;
-    struct raster_args args = {.view = plan->view, .mesh = plan->meshes[i].args, .behind = builder->layer > 1};
+    struct raster_args args = {.view = plan->view, .mesh = plan->mesh.list[i].args, .behind = builder->layer > 1};
     struct pt_ref refs[2 + PT_KIND_BUFFERS] = {pt_plane_at(PT_PLANE_MESH_KEYS, 0)};
     uint32_t count = 1 + pt_bind_kind(PT_AS_MESH, i, refs + 1);
     refs[count++] = pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0);
@@ -24,11 +24,11 @@ static void plan_cover(struct pt_builder *builder, uint32_t i, int shown)
 {
     const struct pt_plan *plan = builder->plan;
     struct cover_args args = {.view = plan->view,
-                              .mesh = plan->meshes[i].args,
+                              .mesh = plan->mesh.list[i].args,
                               .behind = builder->layer > 1,
                               .shown = (uint32_t)shown,
-                              .first = plan->meshes[i].instance->mesh_style.unlit ? pixels_of(plan) : 0};
-    memcpy(args.view.rect, plan->meshes[i].rect, sizeof args.view.rect);
+                              .first = plan->mesh.list[i].instance->mesh_style.unlit ? pixels_of(plan) : 0};
+    memcpy(args.view.rect, plan->mesh.list[i].rect, sizeof args.view.rect);
     const struct pt_ref refs[] = {pt_keys_of(builder, 0),
                                   pt_from_of(builder, 0),
                                   pt_plane_at(PT_PLANE_NORMAL, 0),
@@ -47,8 +47,8 @@ static void plan_cover(struct pt_builder *builder, uint32_t i, int shown)
 static void plan_paint(struct pt_builder *builder, uint32_t i)
 {
     const struct pt_plan *plan = builder->plan;
-    struct paint_args args = {.view = plan->view, .mesh = plan->meshes[i].args};
-    memcpy(args.view.rect, plan->meshes[i].rect, sizeof args.view.rect);
+    struct paint_args args = {.view = plan->view, .mesh = plan->mesh.list[i].args};
+    memcpy(args.view.rect, plan->mesh.list[i].rect, sizeof args.view.rect);
     PT_REASON(PT_ADD(builder, paint, args,
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_plane_at(PT_PLANE_MESH_KEYS, 0),
                       pt_mesh_buffer_of(PT_MESH_VERTICES, i), pt_mesh_buffer_of(PT_MESH_INDICES, i),
@@ -60,20 +60,20 @@ static void plan_images(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     int some = 0;
-    for (uint32_t i = 0; i < plan->mesh_count; i++)
-        if (in_view(&plan->meshes[i]) && plan->meshes[i].args.texture.levels) {
+    for (uint32_t i = 0; i < plan->mesh.count; i++)
+        if (in_view(&plan->mesh.list[i]) && plan->mesh.list[i].args.texture.levels) {
             plan_paint(builder, i);
             some = 1;
         }
     if (!some)
-        pt_skip(builder, "paint", plan->triangles ? "no mesh in view has an image" : "no mesh is in view");
+        pt_skip(builder, "paint", plan->mesh.triangles ? "no mesh in view has an image" : "no mesh is in view");
 }
 
 static void plan_locate(struct pt_builder *builder, uint32_t i)
 {
     const struct pt_plan *plan = builder->plan;
-    struct locate_args args = {.view = plan->view, .mesh = plan->meshes[i].args, .eye_z = pt_eye_z(builder->scene)};
-    memcpy(args.view.rect, plan->meshes[i].rect, sizeof args.view.rect);
+    struct locate_args args = {.view = plan->view, .mesh = plan->mesh.list[i].args, .eye_z = pt_eye_z(builder->scene)};
+    memcpy(args.view.rect, plan->mesh.list[i].rect, sizeof args.view.rect);
     PT_REASON(PT_ADD(builder, locate, args,
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_plane_at(PT_PLANE_MESH_KEYS, 0),
                       pt_mesh_buffer_of(PT_MESH_VERTICES, i), pt_mesh_buffer_of(PT_MESH_INDICES, i),
@@ -84,8 +84,8 @@ static void plan_locate(struct pt_builder *builder, uint32_t i)
 int pt_mesh_pixels_shadowed(const struct pt_plan *plan)
 {
     int some = 0;
-    for (uint32_t i = 0; i < plan->mesh_count && plan->light_count; i++)
-        some |= in_view(&plan->meshes[i]) && pt_mesh_receives(plan->meshes[i].instance);
+    for (uint32_t i = 0; i < plan->mesh.count && plan->light_count; i++)
+        some |= in_view(&plan->mesh.list[i]) && pt_mesh_receives(plan->mesh.list[i].instance);
     return some;
 }
 
@@ -93,30 +93,30 @@ int pt_mesh_pixels_shadowed(const struct pt_plan *plan)
 static void plan_places(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    plan->mesh_shadows = pt_mesh_pixels_shadowed(plan);
-    for (uint32_t i = 0; i < plan->mesh_count && plan->light_count; i++)
-        if (in_view(&plan->meshes[i]) && pt_mesh_receives(plan->meshes[i].instance))
+    plan->mesh.shadows = pt_mesh_pixels_shadowed(plan);
+    for (uint32_t i = 0; i < plan->mesh.count && plan->light_count; i++)
+        if (in_view(&plan->mesh.list[i]) && pt_mesh_receives(plan->mesh.list[i].instance))
             plan_locate(builder, i);
-    if (!plan->mesh_shadows)
+    if (!plan->mesh.shadows)
         pt_skip(builder, "locate",
-                !plan->triangles    ? "no mesh is in view"
-                : plan->light_count ? "no mesh in view receives shadows"
-                                    : "no light shadows anything");
+                !plan->mesh.triangles ? "no mesh is in view"
+                : plan->light_count   ? "no mesh in view receives shadows"
+                                      : "no light shadows anything");
 }
 
 void pt_plan_meshes(struct pt_builder *builder, int shown)
 {
     const struct pt_plan *plan = builder->plan;
-    if (!plan->triangles) {
-        const char *reason = plan->mesh_count ? "no mesh is in view" : "the scene has no mesh";
+    if (!plan->mesh.triangles) {
+        const char *reason = plan->mesh.count ? "no mesh is in view" : "the scene has no mesh";
         pt_skip(builder, "raster", reason);
         pt_skip(builder, "cover", reason);
     }
-    for (uint32_t i = 0; i < plan->mesh_count; i++)
-        if (in_view(&plan->meshes[i]))
+    for (uint32_t i = 0; i < plan->mesh.count; i++)
+        if (in_view(&plan->mesh.list[i]))
             plan_raster(builder, i);
-    for (uint32_t i = 0; i < plan->mesh_count; i++)
-        if (in_view(&plan->meshes[i]))
+    for (uint32_t i = 0; i < plan->mesh.count; i++)
+        if (in_view(&plan->mesh.list[i]))
             plan_cover(builder, i, shown);
     if (shown) {
         plan_images(builder);
@@ -139,9 +139,9 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
     const struct pt_plan *plan = builder->plan;
     struct shade_args args;
     int blended = 0;
-    for (uint32_t i = 0; i < plan->mesh_count; i++)
-        blended |= in_view(&plan->meshes[i]) && plan->meshes[i].args.texture.blend;
-    pt_shade_lights(builder, plan->mesh_shadows && !unlit, &args);
+    for (uint32_t i = 0; i < plan->mesh.count; i++)
+        blended |= in_view(&plan->mesh.list[i]) && plan->mesh.list[i].args.texture.blend;
+    pt_shade_lights(builder, plan->mesh.shadows && !unlit, &args);
     if (unlit)
         pt_without_lights(&args);
     // a point for each pixel, with its index as id
@@ -172,9 +172,9 @@ void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)
 {
     const struct pt_plan *plan = builder->plan;
     int some[2] = {0, 0};
-    for (uint32_t i = 0; i < plan->mesh_count; i++)
-        if (in_view(&plan->meshes[i]))
-            some[plan->meshes[i].instance->mesh_style.unlit] = 1;
+    for (uint32_t i = 0; i < plan->mesh.count; i++)
+        if (in_view(&plan->mesh.list[i]))
+            some[plan->mesh.list[i].instance->mesh_style.unlit] = 1;
     for (int unlit = 0; unlit < 2; unlit++)
         if (some[unlit])
             plan_shade(builder, color, unlit);

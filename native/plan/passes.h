@@ -206,16 +206,16 @@ static inline struct pt_ref pt_field_of(const struct pt_plan_instance *instance,
 void pt_plan_soft(struct pt_builder *builder);
 static inline int pt_counts_soft(const struct pt_builder *builder) // for the pass of their density, which is cleared before
 {
-    return builder->plan->soft_part_count && builder->scene->settings.passes >> PATINA_PASS_DENSITY & 1u;
+    return builder->plan->soft.part_count && builder->scene->settings.passes >> PATINA_PASS_DENSITY & 1u;
 }
 // Of several layers, before one is shaded: those between it and the layer before; and behind the last.
 void pt_plan_soft_layer(struct pt_builder *builder);
 void pt_plan_soft_beyond(struct pt_builder *builder);
-// Of a light's map with soft points in it: what its rays lose in each of plan->veils slabs.
+// Of a light's map with soft points in it: what its rays lose in each of plan->soft.veils slabs.
 void pt_plan_veil(struct pt_builder *builder);
 static inline float pt_veil_deep(const struct pt_plan *plan)
 {
-    const float deep = (plan->soft_depths[1] - plan->soft_depths[0]) / (float)plan->veils;
+    const float deep = (plan->soft.depths[1] - plan->soft.depths[0]) / (float)plan->soft.veils;
     return deep > 1e-30f ? deep : 1e-30f;
 }
 

@@ -143,9 +143,9 @@ static struct extract_args extract_args(const struct pt_builder *builder, uint32
                                 .normal = passes >> PATINA_PASS_NORMAL & 1u,
                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
                                 .shadow = pt_plan_shows(plan) && plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u),
-                                .discs_first = plan->discs_first,
+                                .discs_first = plan->discs.first,
                                 // of layers only the last is there still; where no disc is drawn nothing says where one fell
-                                .discs_count = plan->layers > 1 || !fills_planes(plan) ? 0 : plan->discs_count};
+                                .discs_count = plan->layers > 1 || !fills_planes(plan) ? 0 : plan->discs.count};
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
@@ -374,13 +374,13 @@ static void plan_surfaces(struct pt_builder *builder)
 static void plan_shadows(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    if (plan->light_count && (builder->layer == 1 || plan->mesh_shadows))
+    if (plan->light_count && (builder->layer == 1 || plan->mesh.shadows))
         pt_add_passes_step(builder, PT_STEP_PASSES);
     if (builder->layer == 1)
         plan_marks(builder);
     if (builder->layer == 1 && plan->light_count)
         pt_add_passes_step(builder, PT_STEP_MARK);
-    if (plan->light_count && (builder->layer == 1 || plan->mesh_shadows))
+    if (plan->light_count && (builder->layer == 1 || plan->mesh.shadows))
         pt_plan_light_steps(builder);
     if (pt_blends_light(builder))
         pt_plan_blend_light(builder);
@@ -444,7 +444,7 @@ static void put_together(const struct pt_builder *builder)
                               1u << PATINA_PASS_SHADOW; // are taken from its planes, at the end
     uint32_t first = builder->tail, end = first, leaves = 0;
     int picture = 0, reads = 0;
-    if (settings->layer_passes || plan->triangles || (plan->layers == 1 && plan->transparent) ||
+    if (settings->layer_passes || plan->mesh.triangles || (plan->layers == 1 && plan->transparent) ||
         (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
         return;
     for (; end < plan->pass_count; end++) {
@@ -539,7 +539,7 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
     builder->plan->line_radius = 0.0f;
     pt_plan_clears(builder, 1);
-    if (builder->plan->soft_count)
+    if (builder->plan->soft.count)
         pt_plan_sift(builder);
     if (builder->plan->light_count) {
         pt_add_passes_step(builder, PT_STEP_PASSES);
@@ -585,7 +585,7 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
     if (!scene->has_camera)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
     int error = pt_plan_view(scene, plan);
-    if (!error && (pt_plan_shows(plan) || plan->soft_part_count) && !no_shadows(scene))
+    if (!error && (pt_plan_shows(plan) || plan->soft.part_count) && !no_shadows(scene))
         pt_plan_lights(scene, plan);
     if (!error) {
         if (pt_plan_shows(plan))
@@ -593,7 +593,7 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
         else
             plan_nothing(&builder, scene->mesh_count     ? "nothing is in view"
                                    : !scene->cloud_count ? "the scene has no cloud"
-                                   : plan->soft_count    ? "everything in view is soft"
+                                   : plan->soft.count    ? "everything in view is soft"
                                    : !plan->chunks       ? "the clouds have no points"
                                                          : "no cloud is in view");
         error = builder.failed;

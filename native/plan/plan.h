@@ -21,8 +21,8 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 // serve one layer after another. What a plane holds says kernels.def. No order here means anything.
 // X(name, format, size, slots, carried)
 //   size: WINDOW: the view's; LIGHTS: one of these for each light that casts shadows; CROP: the picture that callers read; TILES: of
-//         16 x 16 pixels of the window; RECORDS: no pixels, but plan->soft_records of them; BINS: as many as these need; DISCS:
-//         plan->disc_bins; CELLS: of the largest image buffer; VEILS: the view's, plan->veils for each pixel
+//         16 x 16 pixels of the window; RECORDS: no pixels, but plan->soft.records of them; BINS: as many as these need; DISCS:
+//         plan->discs.bins; CELLS: of the largest image buffer; VEILS: the view's, plan->soft.veils for each pixel
 //   slots: ONE; LEVELS: coarser ones too; LAYERS: one each
 //   carried: from layer to layer
 #define PT_PLANES(X)                                                                                                           \
@@ -260,6 +260,31 @@ struct pt_plan_mesh {
     uint32_t rect[4]; // in the planes; empty where it is out of view: x0 >= x1
 };
 
+// What one kind alone has of a plan, as `as` holds it of an instance.
+struct pt_plan_soft {
+    uint32_t count, entries;    // instances in view; those and what parts draw
+    struct pt_soft_part *parts; // those farther away first, rows beside each other
+    uint32_t part_count;
+    uint32_t records; // room for the largest part
+    float depths[2];  // z that balls of the whole picture begin and end at
+    uint32_t veils;   // of a light's map: slabs of depth that its soft points are counted in; 0: it is one of surfaces
+};
+struct pt_plan_discs {
+    double entries;        // in bins, as their sizes on screen let expect
+    uint32_t bins;         // of 16 bytes: pt_plan_set_bins
+    uint32_t first, count; // ids whose points are discs
+};
+struct pt_plan_images {
+    uint32_t reach; // pixels, of what is drawn as range images around the picture; 0: nothing is
+    uint32_t cells; // of the largest image buffer
+};
+struct pt_plan_meshes {
+    struct pt_plan_mesh *list;
+    uint32_t count;
+    uint64_t triangles; // of those in view; 0: none is
+    int shadows;        // some of these receive shadows: their pixels are tested
+};
+
 // The maps of one sample: those of all opaque casters; of all but one that must not shadow itself, for that one; and of
 // every transparent caster by itself, layer behind layer where its points have opacities of their own.
 struct pt_shadow_group {
@@ -302,21 +327,12 @@ struct pt_plan {
     struct pt_plan_instance
         *instances; // behind those that the count counts: soft ones, whole, and then what parts draw of them
     uint32_t instance_count;
-    uint32_t soft_count, soft_entries; // soft instances in view; those and what parts draw
-    struct pt_soft_part *soft_parts;   // those farther away first, rows beside each other
-    uint32_t soft_part_count;
-    uint32_t soft_records; // room for the largest part
-    float soft_depths[2];  // z that balls of the whole picture begin and end at
-    uint32_t veils;        // of a light's map: slabs of depth that its soft points are counted in; 0: it is one of surfaces
-    double disc_entries;   // in bins of discs, as their sizes on screen let expect
-    uint32_t disc_bins;    // of 16 bytes: pt_plan_set_bins
-    uint32_t discs_first, discs_count; // ids whose points are discs
+    struct pt_plan_soft soft;
+    struct pt_plan_discs discs;
+    struct pt_plan_images ranges;
+    struct pt_plan_meshes mesh;
     int sigmas;  // some points know how thick their surface is: d_eff follows it, and the span plane holds
     int reaches; // points know how far they spread: holes are closed no farther
-    struct pt_plan_mesh *meshes;
-    uint32_t mesh_count;
-    uint64_t triangles; // of meshes in view; 0: none is
-    int mesh_shadows;   // some of these receive shadows: their pixels are tested
     struct pt_pass *passes;
     uint32_t pass_count;
     struct pt_step *steps; // what of them runs when
@@ -347,8 +363,6 @@ struct pt_plan {
     double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
     int filled;             // some points around the picture are pixels, not discs
-    uint32_t range_reach;   // pixels, of what is drawn as range images around the picture; 0: nothing is
-    uint32_t cells;         // of the largest image buffer
     uint32_t quality, fill; // as set, or as the error target chose them
     int map;                // of a light
     enum pt_means means;    // that `expected` is of
@@ -396,7 +410,7 @@ static inline int pt_plan_draws(const struct pt_plan *plan, enum pt_kind kind)
 }
 
 // Is there anything in view that is no soft point?
-static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->triangles; }
+static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->mesh.triangles; }
 
 // Every pointer inside belongs to the plan; the clouds must outlive it. Message on the scene when it fails.
 int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan);
@@ -423,7 +437,7 @@ struct pt_abilities {
     uint32_t bin_threads;  // device.h
     uint64_t bins_had;     // bytes that the bins of discs came to in the picture before
 };
-// Finds plan->disc_bins, plan->lives, and which of them share slabs; apart: none do, for all are to be looked at afterwards.
+// Finds plan->discs.bins, plan->lives, and which of them share slabs; apart: none do, for all are to be looked at afterwards.
 // PATINA_ERROR_MEMORY, or 0.
 int pt_plan_share_planes(struct pt_plan *plan, const struct pt_abilities *abilities, int apart);
 // The rule of the bins' room: a quarter more entries than are expected, for each thread a block of each tile that is not full, and those

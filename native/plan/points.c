@@ -15,7 +15,7 @@ void pt_plan_points(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     if (!pt_plan_draws(plan, PT_AS_POINTS)) {
-        if (!plan->cells)
+        if (!plan->ranges.cells)
             pt_skip(builder, "scatter",
                     builder->scene->settings.surface == PATINA_SURFACE_SPLATS
                         ? "the settings ask for discs"

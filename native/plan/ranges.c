@@ -92,8 +92,8 @@ static void place(const struct patina_scene *scene, struct pt_plan *plan, const 
     cells->footprint = (float)fmax(out->eye.xs, out->eye.ys);
     memset(cells->rect, 0, sizeof cells->rect);
     set_gamma(scene, instance, scale, out);
-    if ((uint64_t)across[0] * across[1] > plan->cells)
-        plan->cells = across[0] * across[1];
+    if ((uint64_t)across[0] * across[1] > plan->ranges.cells)
+        plan->ranges.cells = across[0] * across[1];
 }
 
 void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
@@ -220,6 +220,14 @@ static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_ra
               "faces between instance %u's cells%s%s", i, told[pass], behind ? ", behind what is drawn already" : "");
 }
 
+const struct pt_range *pt_range_of(const struct pt_plan_instance *instance, uint32_t level)
+{
+    const struct pt_range *range = instance->as.range;
+    for (; level; level--)
+        range = range->fine;
+    return range;
+}
+
 static void add_range(struct pt_builder *builder, uint32_t i, int behind)
 {
     const struct pt_range *range = builder->plan->instances[i].as.range;
@@ -263,7 +271,7 @@ void pt_plan_reveal(struct pt_builder *builder)
 void pt_plan_ranges(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    if (!plan->cells) {
+    if (!plan->ranges.cells) {
         static const char *const names[] = {"coarsen", "merge", "incline", "magnify"};
         for (int k = 0; k < 4; k++)
             pt_skip(builder, names[k], "no cloud in view is drawn as range images");

@@ -25,6 +25,8 @@ struct pt_spread {
     double least, middle, most; // pixels at 1, 50 and 95 %
 };
 
+// Of an instance that is drawn as them: 0: all its chunks; from 1 on finer and finer cells.
+const struct pt_range *pt_range_of(const struct pt_plan_instance *instance, uint32_t level);
 // Whether the instance is. Not where 32 bits hold no ids for it: it is filled then.
 int pt_draws_ranges(const struct patina_scene *scene, const struct pt_instance *instance);
 // The side of its cells, from the spacing of its points on screen, and of finer ones that take their place: pixels. Returns how many

@@ -78,14 +78,14 @@ static int place_instance(struct placing *p, uint32_t i)
     const struct pt_instance *instance = &p->scene->instances[i];
     const struct patina_cloud *cloud = instance->cloud;
     struct pt_arena **arena = &p->plan->arena;
-    struct pt_plan_instance *out = &p->whole[p->plan->soft_count];
+    struct pt_plan_instance *out = &p->whole[p->plan->soft.count];
     struct pt_object object;
     double rows[9];
     int error = PATINA_OK;
     *out = (struct pt_plan_instance){.kind = PT_AS_SOFT, .instance = instance, .of = i, .marked = pt_is_marked(instance)};
     out->chunks = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->bounds);
-    struct depths *depths = p->depths[p->plan->soft_count] = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *depths);
+    struct depths *depths = p->depths[p->plan->soft.count] = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *depths);
     struct pt_inverse_clip *clips = pt_arena_take(arena, (p->scene->clip_count + 1) * sizeof *clips);
     if (!out->chunks || !out->bounds || !depths || !clips)
         return PATINA_ERROR_MEMORY;
@@ -96,7 +96,7 @@ static int place_instance(struct placing *p, uint32_t i)
     out->as.balls = pt_balls_of(&(struct pt_to_place){p->scene, instance, &object});
     for (uint32_t c = 0; c < cloud->chunk_count && !error && instance->style.transparency < 1.0f; c++)
         error = place_chunk(p, out, depths, &sieve, &object, rows, &cloud->chunks[c]);
-    p->plan->soft_count += out->chunk_count > 0;
+    p->plan->soft.count += out->chunk_count > 0;
     return error;
 }
 
@@ -116,7 +116,7 @@ static uint32_t slab_ends(struct placing *p, float ends[MOST_SLABS])
     uint32_t count = 0;
     for (uint32_t i = 0; i < p->seen_count; i++)
         total += p->seen[i].records;
-    if (p->plan->soft_count && p->whole[0].instance->style.soft_model >= PATINA_SOFT_SPLATS)
+    if (p->plan->soft.count && p->whole[0].instance->style.soft_model >= PATINA_SOFT_SPLATS)
         return 0; // each slab would have a nearest surface
     const uint64_t wanted = total <= PART_RECORDS ? 1 : 2 * total / PART_RECORDS + 1,
                    slabs = wanted < MOST_SLABS ? wanted : MOST_SLABS;
@@ -133,7 +133,7 @@ static uint32_t slab_ends(struct placing *p, float ends[MOST_SLABS])
 // The pixels that soft points are drawn on: a light's map is read between its texels' middles.
 static void drawn_rect(const struct pt_plan *plan, uint32_t rect[4])
 {
-    const uint32_t *crop = plan->crop, around = plan->veils > 0;
+    const uint32_t *crop = plan->crop, around = plan->soft.veils > 0;
     for (int k = 0; k < 2; k++) {
         rect[k] = crop[k] - around; // there is a guard
         rect[2 + k] = crop[k] + crop[2 + k] + around;
@@ -189,7 +189,7 @@ static int place_part(struct placing *p, struct pt_soft_part part)
     struct pt_plan *plan = p->plan;
     uint64_t records = 0;
     part.first = p->entries;
-    for (uint32_t i = 0; i < plan->soft_count; i++)
+    for (uint32_t i = 0; i < plan->soft.count; i++)
         records += records_of(p, i, &part);
     if (records > PART_RECORDS && part.rows[1] - part.rows[0] > LEAST_ROWS) {
         struct pt_soft_part half[2] = {part, part};
@@ -202,7 +202,7 @@ static int place_part(struct placing *p, struct pt_soft_part part)
                        "%llu soft points lie behind one another in %u rows: render in regions", (unsigned long long)records,
                        part.rows[1] - part.rows[0]);
     uint32_t placed = 0;
-    for (uint32_t i = 0; i < plan->soft_count && records; i++) {
+    for (uint32_t i = 0; i < plan->soft.count && records; i++) {
         const uint64_t own = records_of(p, i, &part);
         if (own && p->filling && fill_entry(p, i, &part, placed))
             return PATINA_ERROR_MEMORY;
@@ -212,9 +212,9 @@ static int place_part(struct placing *p, struct pt_soft_part part)
     part.count = p->entries - part.first;
     part.records = placed;
     if (placed && p->filling)
-        plan->soft_parts[plan->soft_part_count] = part;
-    plan->soft_part_count += placed > 0;
-    plan->soft_records = placed > plan->soft_records ? placed : plan->soft_records;
+        plan->soft.parts[plan->soft.part_count] = part;
+    plan->soft.part_count += placed > 0;
+    plan->soft.records = placed > plan->soft.records ? placed : plan->soft.records;
     return PATINA_OK;
 }
 
@@ -223,8 +223,8 @@ static int place_parts(struct placing *p, const float *ends, uint32_t count)
     uint32_t drawn[4];
     int error = PATINA_OK;
     drawn_rect(p->plan, drawn);
-    p->entries = p->plan->instance_count + p->plan->soft_count;
-    p->plan->soft_part_count = 0;
+    p->entries = p->plan->instance_count + p->plan->soft.count;
+    p->plan->soft.part_count = 0;
     for (uint32_t k = count + 1; k-- > 0 && !error;) // the farthest first
         error = place_part(p, (struct pt_soft_part){.rows = {drawn[1], drawn[3]},
                                                     .z_from = k ? ends[k - 1] : -1.0f,
@@ -253,25 +253,25 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
         if (scene->instances[i].style.soft)
             error = place_instance(&p, i);
-    plan->soft_depths[0] = INFINITY;
-    plan->soft_depths[1] = -INFINITY;
+    plan->soft.depths[0] = INFINITY;
+    plan->soft.depths[1] = -INFINITY;
     for (uint32_t i = 0; i < p.seen_count; i++) {
-        plan->soft_depths[0] = fminf(plan->soft_depths[0], p.seen[i].before);
-        plan->soft_depths[1] = fmaxf(plan->soft_depths[1], p.seen[i].beyond);
+        plan->soft.depths[0] = fminf(plan->soft.depths[0], p.seen[i].before);
+        plan->soft.depths[1] = fmaxf(plan->soft.depths[1], p.seen[i].beyond);
     }
-    const uint32_t count = error || !plan->soft_count ? 0 : slab_ends(&p, ends);
-    if (error || !plan->soft_count || (error = place_parts(&p, ends, count)))
+    const uint32_t count = error || !plan->soft.count ? 0 : slab_ends(&p, ends);
+    if (error || !plan->soft.count || (error = place_parts(&p, ends, count)))
         return error;
     struct pt_plan_instance *grown = pt_arena_take(&plan->arena, (p.entries + 1) * sizeof *grown);
-    plan->soft_parts = pt_arena_take(&plan->arena, (plan->soft_part_count + 1) * sizeof *plan->soft_parts);
-    if (!grown || !plan->soft_parts)
+    plan->soft.parts = pt_arena_take(&plan->arena, (plan->soft.part_count + 1) * sizeof *plan->soft.parts);
+    if (!grown || !plan->soft.parts)
         return PATINA_ERROR_MEMORY;
     memcpy(grown, plan->instances, plan->instance_count * sizeof *grown);
-    memcpy(grown + plan->instance_count, p.whole, plan->soft_count * sizeof *grown);
+    memcpy(grown + plan->instance_count, p.whole, plan->soft.count * sizeof *grown);
     plan->instances = grown;
     p.filling = 1;
     error = place_parts(&p, ends, count);
-    plan->soft_entries = p.entries - plan->instance_count;
+    plan->soft.entries = p.entries - plan->instance_count;
     return error;
 }
 
@@ -370,10 +370,10 @@ static void plan_gathers(struct pt_builder *builder, const struct pt_soft_part *
 static void plan_part(struct pt_builder *builder, uint32_t number, enum into into, int counted)
 {
     const struct pt_plan *plan = builder->plan;
-    const struct pt_soft_part *part = &plan->soft_parts[number];
+    const struct pt_soft_part *part = &plan->soft.parts[number];
     struct soft_args args = part_args(plan, part, into);
     args.density = counted ? 2 : 0;
-    if (plan->soft_part_count > 1 || (into == BEFORE && plan->layers == 1)) // else they are there since the first layer
+    if (plan->soft.part_count > 1 || (into == BEFORE && plan->layers == 1)) // else they are there since the first layer
         plan_gathers(builder, part);
     PT_REASON(
         PT_ADD(builder, soft, args,
@@ -382,7 +382,7 @@ static void plan_part(struct pt_builder *builder, uint32_t number, enum into int
                 pt_plane_at(into == BEFORE ? PT_PLANE_COMBINED : PT_PLANE_OVER, 0), pt_plane_if(counted, PT_PLANE_DENSITY, 0),
                 pt_nothing()}),
         "%s %s, part %u of %u, z %.3g to %.3g, rows %u to %u: %u records",
-        models[plan->instances[part->first].instance->style.soft_model].name, places[into], number + 1, plan->soft_part_count,
+        models[plan->instances[part->first].instance->style.soft_model].name, places[into], number + 1, plan->soft.part_count,
         fmax((double)part->z_from, 0.0), (double)part->z_to, part->rows[0] - plan->crop[1], part->rows[1] - plan->crop[1],
         part->records);
 }
@@ -391,7 +391,7 @@ static void plan_part(struct pt_builder *builder, uint32_t number, enum into int
 static void plan_reached(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    struct soft_args args = part_args(plan, &plan->soft_parts[0], BETWEEN);
+    struct soft_args args = part_args(plan, &plan->soft.parts[0], BETWEEN);
     args.records = 0;
     args.last = 1;
     args.view.rect[1] = plan->crop[1];
@@ -405,18 +405,18 @@ static void plan_reached(struct pt_builder *builder)
 void pt_plan_soft_layer(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    if (plan->layers == 1 || !plan->soft_part_count)
+    if (plan->layers == 1 || !plan->soft.part_count)
         return;
-    if (builder->layer == 1 && plan->soft_part_count == 1)
-        plan_gathers(builder, &plan->soft_parts[0]);
-    for (uint32_t k = plan->soft_part_count; k-- > 0 && builder->layer > 1;) // the nearest first
+    if (builder->layer == 1 && plan->soft.part_count == 1)
+        plan_gathers(builder, &plan->soft.parts[0]);
+    for (uint32_t k = plan->soft.part_count; k-- > 0 && builder->layer > 1;) // the nearest first
         plan_part(builder, k, BETWEEN, 0);
     plan_reached(builder);
 }
 
 void pt_plan_soft_beyond(struct pt_builder *builder)
 {
-    for (uint32_t k = builder->plan->soft_part_count; k-- > 0 && builder->plan->layers > 1;)
+    for (uint32_t k = builder->plan->soft.part_count; k-- > 0 && builder->plan->layers > 1;)
         plan_part(builder, k, BEYOND, 0);
 }
 
@@ -427,13 +427,13 @@ void pt_plan_soft(struct pt_builder *builder)
     uint32_t soft = 0;
     for (uint32_t i = 0; i < builder->scene->cloud_count; i++)
         soft += builder->scene->instances[i].style.soft != PATINA_SOFT_OFF;
-    if (!plan->soft_part_count) {
+    if (!plan->soft.part_count) {
         const char *reason = soft ? "no soft cloud is in view" : "no cloud is soft";
         pt_skip(builder, "gather", reason);
         pt_skip(builder, "soft", reason);
     }
     plan->assessed |= (uint32_t)counted << PATINA_PASS_DENSITY;
-    for (uint32_t k = 0; k < plan->soft_part_count; k++)
+    for (uint32_t k = 0; k < plan->soft.part_count; k++)
         plan_part(builder, k, BEFORE, counted);
 }
 
@@ -444,8 +444,8 @@ static void plan_veil(struct pt_builder *builder, const struct pt_soft_part *par
     const struct pt_plan *plan = builder->plan;
     struct soft_args args = part_args(plan, part, BEFORE);
     args.model = args.model >= PT_SOFT_SPLATS ? PT_SOFT_EXPRESS : args.model; // what is nearest says nothing of depth
-    args.veils = plan->veils;
-    args.veil_from = plan->soft_depths[0];
+    args.veils = plan->soft.veils;
+    args.veil_from = plan->soft.depths[0];
     args.veil_deep = pt_veil_deep(plan);
     args.last = (uint32_t)last;
     if (last) {
@@ -459,16 +459,16 @@ static void plan_veil(struct pt_builder *builder, const struct pt_soft_part *par
     if (last)
         PT_REASON(pass, "what comes through up to the end of each slab");
     else
-        PT_REASON(pass, "what %u records take of the light in %u slabs", part->records, plan->veils);
+        PT_REASON(pass, "what %u records take of the light in %u slabs", part->records, plan->soft.veils);
 }
 
 void pt_plan_veil(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     pt_plan_sift(builder);
-    for (uint32_t k = 0; k < plan->soft_part_count; k++) {
-        plan_gathers(builder, &plan->soft_parts[k]);
-        plan_veil(builder, &plan->soft_parts[k], 0);
+    for (uint32_t k = 0; k < plan->soft.part_count; k++) {
+        plan_gathers(builder, &plan->soft.parts[k]);
+        plan_veil(builder, &plan->soft.parts[k], 0);
     }
-    plan_veil(builder, &plan->soft_parts[0], 1);
+    plan_veil(builder, &plan->soft.parts[0], 1);
 }

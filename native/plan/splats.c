@@ -117,9 +117,9 @@ void pt_plan_splat(struct pt_builder *builder)
     struct disc_pass discs;
     if (!pt_plan_draws(plan, PT_AS_DISCS)) {
         const int points = pt_plan_draws(plan, PT_AS_POINTS);
-        const char *reason = plan->cells && !points                                    ? "all clouds in view are range images"
+        const char *reason = plan->ranges.cells && !points                             ? "all clouds in view are range images"
                              : builder->scene->settings.surface == PATINA_SURFACE_FILL ? "the settings ask for filling"
-                             : plan->discs_count ? "no footprint in view is wide enough for a disc"
+                             : plan->discs.count ? "no footprint in view is wide enough for a disc"
                                                  : "no cloud in view was analysed";
         pt_skip(builder, "splat", reason);
         pt_skip(builder, "blend", reason);

@@ -74,9 +74,9 @@ void pt_plan_clears(struct pt_builder *builder, int shown)
     enum { NOWHERE = 0x7FC00000 }; // the bits of a NaN
     struct pt_plan *plan = builder->plan;
     clear_keys(builder, pt_keys_of(builder, 0), "no point is drawn");
-    if (plan->triangles)
+    if (plan->mesh.triangles)
         clear_keys(builder, pt_plane_at(PT_PLANE_MESH_KEYS, 0), "no triangle is drawn");
-    if (!plan->triangles || !shown)
+    if (!plan->mesh.triangles || !shown)
         return;
     clear_keys(builder, pt_plane_at(PT_PLANE_MESH_SHOWN, 0), "no mesh is shown");
     if (pt_mesh_pixels_shadowed(plan))
@@ -101,7 +101,7 @@ static void nothing_reached(struct pt_builder *builder)
 
 void pt_plan_peeling(struct pt_builder *builder)
 {
-    if (builder->plan->soft_part_count)
+    if (builder->plan->soft.part_count)
         nothing_reached(builder);
     if (builder->plan->line_radius > 0.0f)
         add_clear(builder, pt_plane_at(PT_PLANE_OVER, 0), 0, 4, "lines find nothing before them");

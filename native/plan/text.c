@@ -25,18 +25,18 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_
         return;
     }
     if (row->size == PT_SIZE_RECORDS || row->size == PT_SIZE_BINS) {
-        size[0] = row->size == PT_SIZE_RECORDS ? plan->soft_records
-                                               : PT_SOFT_BINS_HEAD + PT_SOFT_BINS_EACH * plan->soft_records;
+        size[0] = row->size == PT_SIZE_RECORDS ? plan->soft.records
+                                               : PT_SOFT_BINS_HEAD + PT_SOFT_BINS_EACH * plan->soft.records;
         size[1] = 1;
         return;
     }
     if (row->size == PT_SIZE_CELLS || row->size == PT_SIZE_DISCS) {
-        size[0] = row->size == PT_SIZE_CELLS ? plan->cells : plan->disc_bins;
+        size[0] = row->size == PT_SIZE_CELLS ? plan->ranges.cells : plan->discs.bins;
         size[1] = 1;
         return;
     }
     struct view_args view = pt_view_at(plan, row->slots == PT_SLOTS_LEVELS || row->size == PT_SIZE_TILES ? level : 0);
-    size[0] = view.width * (row->size == PT_SIZE_VEILS ? plan->veils : 1);
+    size[0] = view.width * (row->size == PT_SIZE_VEILS ? plan->soft.veils : 1);
     size[1] = view.height * (row->size == PT_SIZE_LIGHTS ? plan->light_count : 1);
 }
 
@@ -101,7 +101,7 @@ static void put_steps(struct text *text, const struct patina_scene *scene, const
 static void put_map(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
                     uint32_t depth)
 {
-    struct pt_round round = {.light = step->light, .group = step->group, .points = 1, .pixels = plan->mesh_shadows};
+    struct pt_round round = {.light = step->light, .group = step->group, .points = 1, .pixels = plan->mesh.shadows};
     struct pt_plan map;
     put_line(text, depth, "plan %-10s %s%s", "map", step->reason, step->layer > 1 ? ", as of layer 1" : "");
     if (step->layer > 1)
@@ -113,7 +113,8 @@ static void put_map(struct text *text, const struct patina_scene *scene, const s
             map.round_bytes = plan->round_bytes;
             map.copied = plan->copied;
             put_line(text, depth + 1, "planes %u x %u, %u coarse levels, %llu points, %llu triangles", map.view.width,
-                     map.view.height, map.levels, (unsigned long long)map.points_scattered, (unsigned long long)map.triangles);
+                     map.view.height, map.levels, (unsigned long long)map.points_scattered,
+                     (unsigned long long)map.mesh.triangles);
             put_steps(text, scene, &map, map.steps, map.steps + map.step_count, depth + 1);
         }
         pt_plan_destroy(&map);

@@ -275,7 +275,7 @@ static int choose_cells(const struct patina_scene *scene, struct pt_plan *plan, 
         error = spacing_on_screen(survey, i, i + 1, &cells->spread);
         cells->count = pt_range_pixels(scene, &scene->instances[i], &cells->spread, cells->pixels);
         const uint32_t reach = pt_range_reach(cells->pixels[0]);
-        plan->range_reach = reach > plan->range_reach && survey->seen_count[i] ? reach : plan->range_reach;
+        plan->ranges.reach = reach > plan->ranges.reach && survey->seen_count[i] ? reach : plan->ranges.reach;
     }
     return error;
 }
@@ -364,7 +364,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         pt_join_rect(out->rect, rect);
         out->points += count;
         plan->points_scattered += count;
-        plan->disc_entries += kind == PT_AS_DISCS ? seen->tiles * count : 0.0;
+        plan->discs.entries += kind == PT_AS_DISCS ? seen->tiles * count : 0.0;
     }
     pt_join_rect(plan->view.rect, out->rect);
     plan->chunks_culled -= out->chunk_count;
@@ -401,7 +401,7 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     for (uint32_t k = 0; k < survey->seen_count[i] && !all; k++)
         wide |= survey->seen[i][k].wide;
     if (!error && wide)
-        error = place_chunks(scene, plan, survey, i, PT_AS_DISCS, plan->discs_first, NULL,
+        error = place_chunks(scene, plan, survey, i, PT_AS_DISCS, plan->discs.first, NULL,
                              &plan->instances[plan->instance_count++]);
     return error;
 }
@@ -450,7 +450,7 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
     memcpy(args->color, instance->mesh_style.color, sizeof args->color);
     plan_texture(plan, instance, &args->texture);
     pt_join_rect(plan->view.rect, out->rect);
-    plan->triangles += mesh->info.triangle_count;
+    plan->mesh.triangles += mesh->info.triangle_count;
 }
 
 // What the whole picture sees decides spacing, levels, guard: a region must decide alike. 160 covers any guard.
@@ -491,30 +491,30 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = {0};
     plan->instances = pt_arena_take(&plan->arena, (2 * (size_t)scene->cloud_count + 1) * sizeof *plan->instances);
-    plan->mesh_count = scene->mesh_count;
-    plan->meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->meshes);
-    if (!plan->instances || !plan->meshes)
+    plan->mesh.count = scene->mesh_count;
+    plan->mesh.list = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->mesh.list);
+    if (!plan->instances || !plan->mesh.list)
         return PATINA_ERROR_MEMORY;
     // 1. Spacings.
     int error = look_around(scene, plan, &survey);
     if (error || (error = choose_cells(scene, plan, &survey)))
         return error;
-    plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
-    plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
+    plan->discs.first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
+    plan->discs.count = survey.discs ? (uint32_t)scene->points : 0;
     plan->filled = survey.points;
-    plan->reaches = plan->discs_count &&
+    plan->reaches = plan->discs.count &&
                     pt_knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
     plan->sigmas = pt_knows_sigmas(scene);
     pt_choose_filling(scene, plan);
-    plan->discs_count = plan->range_reach ? (uint32_t)scene->points
-                                          : plan->discs_count; // their pixels say how far off a point fell
+    plan->discs.count = plan->ranges.reach ? (uint32_t)scene->points
+                                           : plan->discs.count; // their pixels say how far off a point fell
     pt_choose_layers(&scene->settings, plan);
     plan->reopens = pt_reopen_rounds(scene, plan);
     plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;
     // Effects see no farther beyond the picture: a wider guard would fill holes at its border otherwise than without them. Lines
     // would break off there.
-    const uint32_t reach = plan->range_reach < FARTHEST_FACE ? plan->range_reach : FARTHEST_FACE;
+    const uint32_t reach = plan->ranges.reach < FARTHEST_FACE ? plan->ranges.reach : FARTHEST_FACE;
     uint32_t guard = pt_round_up(8 + 4 * cell + pt_line_reach(plan) + reach, cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
@@ -528,8 +528,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
         error = place_instance(scene, plan, &survey, i);
     for (uint32_t i = 0; i < scene->mesh_count && !error; i++)
         place_mesh(plan, &survey.camera, pt_mesh_at(scene, i), (uint32_t)scene->points + pt_mesh_at(scene, i)->id_base,
-                   &plan->meshes[i]);
-    return error || (plan->map && !plan->veils) ? error : pt_place_soft(scene, plan, &survey.camera);
+                   &plan->mesh.list[i]);
+    return error || (plan->map && !plan->soft.veils) ? error : pt_place_soft(scene, plan, &survey.camera);
 }
 
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,

@@ -60,13 +60,13 @@ int pt_knows_sigmas(const struct patina_scene *scene)
 void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan)
 {
     const patina_settings *settings = &scene->settings;
-    const int most = plan->discs_count ? LEVELS_BESIDE_DISCS + ilogb((double)pt_finer(scene)) : PT_LEVELS - 1;
+    const int most = plan->discs.count ? LEVELS_BESIDE_DISCS + ilogb((double)pt_finer(scene)) : PT_LEVELS - 1;
     uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
     plan->quality = settings->quality;
     plan->fill = settings->fill;
     plan->levels = plan->iterations = 0;
-    if (settings->surface == PATINA_SURFACE_SPLATS || (plan->range_reach && !plan->filled && !plan->discs_count)) {
+    if (settings->surface == PATINA_SURFACE_SPLATS || (plan->ranges.reach && !plan->filled && !plan->discs.count)) {
         plan->means = settings->surface == PATINA_SURFACE_SPLATS ? PT_MEANS_SPLATS : PT_MEANS_RANGES;
         plan->expected = pt_expected_error(plan->means, s);
         return;
@@ -102,7 +102,7 @@ static uint32_t reach_of(const struct pt_plan *plan, const patina_settings *sett
     uint32_t layer = PT_REACH_normals;
     for (uint32_t level = 0; level <= plan->levels; level++)
         layer += (5 * plan->iterations * PT_REACH_fill + PT_REACH_push) << level;
-    layer += 2 * plan->range_reach; // a face's corners have their normals from cells around
+    layer += 2 * plan->ranges.reach; // a face's corners have their normals from cells around
     return (plan->reopens ? plan->reopens : plan->layers) * layer + (settings->average ? PT_REACH_average : 0) +
            PT_REACH_shade + PT_REACH_smooth + PT_REACH_antialias + pt_line_reach(plan);
 }

@@ -12,9 +12,9 @@
 int pt_binder_open(struct pt_binder *binder)
 {
     const struct pt_plan *plan = binder->plan;
-    binder->instances = calloc((size_t)plan->instance_count + plan->soft_entries + 1, sizeof *binder->instances);
+    binder->instances = calloc((size_t)plan->instance_count + plan->soft.entries + 1, sizeof *binder->instances);
     binder->receivers = calloc((size_t)plan->receiver_count + 1, sizeof *binder->receivers);
-    binder->meshes = calloc((size_t)plan->mesh_count + 1, sizeof *binder->meshes);
+    binder->meshes = calloc((size_t)plan->mesh.count + 1, sizeof *binder->meshes);
     if (!binder->instances || !binder->receivers || !binder->meshes)
         return pt_fail(&binder->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     return pt_plan_buffers_fill(binder->device, plan, binder->own);
@@ -23,7 +23,7 @@ int pt_binder_open(struct pt_binder *binder)
 void pt_binder_close(struct pt_binder *binder)
 {
     const struct pt_plan *plan = binder->plan;
-    for (uint32_t i = 0; i < plan->instance_count + plan->soft_entries && binder->instances; i++) {
+    for (uint32_t i = 0; i < plan->instance_count + plan->soft.entries && binder->instances; i++) {
         binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].chunks);
         free(binder->instances[i].sound);
         for (int k = 0; k < PT_RANGE_FINER; k++)
@@ -139,9 +139,7 @@ static int bind_instance(struct pt_binder *binder, const struct pt_ref *ref, str
     }
     if (ref->which >= PT_FINE_CHUNKS && ref->which < PT_FINE_CHUNKS + PT_RANGE_FINER) {
         const uint32_t level = ref->which - PT_FINE_CHUNKS;
-        const struct pt_range *fine = planned->as.range->fine;
-        for (uint32_t k = 0; k < level; k++)
-            fine = fine->fine;
+        const struct pt_range *fine = pt_range_of(planned, 1 + level);
         *out = &bound->fine[level];
         return bound->fine[level].size
                    ? PATINA_OK
@@ -181,7 +179,7 @@ static int bind_receiver(struct pt_binder *binder, const struct pt_ref *ref, str
 
 static int bind_mesh(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
 {
-    const struct pt_instance *instance = binder->plan->meshes[ref->index].instance;
+    const struct pt_instance *instance = binder->plan->mesh.list[ref->index].instance;
     struct pt_bound_mesh *bound = &binder->meshes[ref->index];
     int error = PATINA_OK;
     *out = &binder->none;

@@ -23,7 +23,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                         .height = plan->crop[3],
                                         .points = plan->points,
                                         .points_scattered = plan->points_scattered,
-                                        .triangles = plan->triangles,
+                                        .triangles = plan->mesh.triangles,
                                         .chunks = plan->chunks,
                                         .chunks_culled = plan->chunks_culled,
                                         .chunks_clipped = plan->chunks_clipped,
@@ -31,8 +31,8 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                         .pixel_samples = 1,
                                         .ms = ms};
     shown->peak = plan->peak;
-    shown->soft_parts = plan->soft_part_count;
-    shown->soft_records = plan->soft_records;
+    shown->soft_parts = plan->soft.part_count;
+    shown->soft_records = plan->soft.records;
     shown->stats.plane_bytes = pt_planes_total(&frame->planes);
     shown->stats.spacing_px = (float)plan->spacing_px;
     shown->stats.expected = plan->expected;
@@ -55,9 +55,9 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     frame->light_count = plan->light_count;
     for (uint32_t i = 0; i < plan->light_count; i++) {
         const struct pt_shadow_light *light = &frame->shadows.lights[i];
-        const int refined = plan->mesh_shadows && frame->shadows.pixels.pending; // at once with the points
+        const int refined = plan->mesh.shadows && frame->shadows.pixels.pending; // at once with the points
         shown->stats.shadow_pending += (light->samples < plan->lights[i].samples && !light->settled) || refined;
-        const uint32_t of_pixels = plan->mesh_shadows ? frame->shadows.pixels.samples[i] : 0;
+        const uint32_t of_pixels = plan->mesh.shadows ? frame->shadows.pixels.samples[i] : 0;
         const uint32_t samples = light->samples > of_pixels ? light->samples : of_pixels;
         shown->stats.shadow_samples = samples > shown->stats.shadow_samples ? samples : shown->stats.shadow_samples;
         shown->stats.shadow_error = fmaxf(shown->stats.shadow_error, light->error);

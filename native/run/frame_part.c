@@ -167,7 +167,7 @@ static int draw_map(struct part_job *job, const struct pt_round *round)
 static int draw_light(struct part_job *job, uint32_t light)
 {
     struct pt_plan *plan = &job->plan;
-    struct pt_round round = {.light = light, .points = 1, .pixels = plan->mesh_shadows};
+    struct pt_round round = {.light = light, .points = 1, .pixels = plan->mesh.shadows};
     int error = pt_plan_light_map(job->scene, plan, light);
     for (round.sample = 0; round.sample < plan->lights[light].samples && !error; round.sample++)
         for (round.group = 0; round.group < plan->group_count && !error; round.group++)

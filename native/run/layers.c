@@ -82,7 +82,7 @@ static int choose_chunks(struct pt_execution *e, struct pt_layer *layer, int *so
         const uint32_t count = pt_layer_chunks(plan, i, e->tiles, e->behind[i], &layer->points);
         error = pt_bind_chunks(&e->binder, i, e->behind[i], count);
     }
-    *some = layer->points > 0 || plan->triangles;
+    *some = layer->points > 0 || plan->mesh.triangles;
     return error;
 }
 

@@ -215,7 +215,7 @@ int pt_run_light(struct pt_execution *e, const struct pt_step *step)
     int error = PATINA_OK;
     if (step->layer <= 1)
         pt_note_time(e->times, "shadows", 0.0); // also where every texture is at hand
-    if (e->plan->mesh_shadows && e->begun != 1 + (int)step->layer)
+    if (e->plan->mesh.shadows && e->begun != 1 + (int)step->layer)
         error = pt_pixels_begin(e->device, &e->binder.shadows->pixels, e->binder.planes, e->plan, &e->shown);
     e->begun = 1 + (int)step->layer;
     if (error)

@@ -13,11 +13,11 @@ static int has_faint_casters(const struct patina_scene *scene, const struct pt_p
 
 const char *pt_parts_refused(const struct patina_scene *scene, const struct pt_plan *plan)
 {
-    int ranges = plan->cells > 0;
+    int ranges = plan->ranges.cells > 0;
     for (uint32_t i = 0; i < plan->instance_count; i++)
         ranges |= plan->instances[i].kind == PT_AS_RANGES;
     return ranges                               ? "range images are"
-           : plan->soft_count                   ? "soft points are"
+           : plan->soft.count                   ? "soft points are"
            : scene->settings.pixel_samples > 1  ? "samples of pixels are"
            : plan->reopens                      ? "what stations looked through (free space) is"
            : has_faint_casters(scene, plan)     ? "shadows of points that have opacities of their own are"

@@ -46,7 +46,7 @@ int pt_pixels_open(struct patina_device *device, struct pt_shadow_pixels *pixels
 {
     const uint64_t count = (uint64_t)plan->view.width * plan->view.height, view = view_of(scene, plan);
     pixels->pending = 0;
-    if (!plan->mesh_shadows)
+    if (!plan->mesh.shadows)
         return PATINA_OK;
     const int again = changed || pixels->view != view;
     for (uint32_t i = 0; i < plan->light_count; i++) {

@@ -324,19 +324,19 @@ static void test_bins_of_discs(void **state)
             for (uint32_t i = 0; i < plan.life_count; i++)
                 lives += plan.lives[i].plane == PT_PLANE_DISC_BINS;
             assert_int_equal(lives, discs && threads);
-            assert_int_equal(plan.disc_bins > 0, discs && threads);
+            assert_int_equal(plan.discs.bins > 0, discs && threads);
             for (uint32_t i = 0; i < plan.pass_count && lives; i++)
                 for (uint32_t k = 0; k < plan.passes[i].ref_count; k++)
                     if (plan.passes[i].refs[k].of == PT_OF_FRAME && plan.passes[i].refs[k].which == PT_PLANE_DISC_BINS)
                         assert_true(plan.passes[i].kernel == PT_KERNEL_splat || plan.passes[i].kernel == PT_KERNEL_blend);
             if (lives) {
-                const uint64_t told = 16 * (uint64_t)plan.disc_bins;
-                assert_true(plan.disc_entries >= (double)plan.points_scattered);
+                const uint64_t told = 16 * (uint64_t)plan.discs.bins;
+                assert_true(plan.discs.entries >= (double)plan.points_scattered);
                 assert_true(told >= pt_bins_bytes(pt_bins_of(&plan.view), threads, plan.points_scattered / PT_BIN_DISCS));
                 pt_plan_set_bins(&plan, threads, 2 * told); // what the picture before came to
-                assert_int_equal(16 * (uint64_t)plan.disc_bins, 2 * told);
+                assert_int_equal(16 * (uint64_t)plan.discs.bins, 2 * told);
                 pt_plan_set_bins(&plan, threads, 8 * told); // of another view
-                assert_int_equal(16 * (uint64_t)plan.disc_bins, told);
+                assert_int_equal(16 * (uint64_t)plan.discs.bins, told);
             }
             pt_plan_destroy(&plan);
             patina_scene_destroy(scene);
