@@ -9,8 +9,9 @@
 #include <math.h>
 #include <string.h>
 
-static int bake_once(struct patina_frame *frame, const struct patina_scene *scene)
+static int bake_once(struct patina_frame *frame, const struct patina_scene *scene, const void *of)
 {
+    (void)of;
     struct patina_scene whole = *scene; // its handle is not touched
     struct pt_plan plan;
     whole.settings.shadow_lazy = whole.settings.shadow_progressive = 0;
@@ -32,17 +33,12 @@ static int bake_once(struct patina_frame *frame, const struct patina_scene *scen
         frame->layers[0] = first;
     }
     pt_plan_destroy(&plan);
-    if (error == PATINA_ERROR_CANCELLED)
-        return pt_fail(&frame->handle, error, "baking shadows was cancelled");
-    return error == PT_AGAIN ? error : error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+    return error;
 }
 
 int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
 {
-    int error;
-    do
-        error = bake_once(frame, scene);
-    while (error == PT_AGAIN);
+    const int error = pt_frame_until_sound(frame, scene, "baking shadows", bake_once, NULL);
     atomic_store(&frame->cancel, 0);
     return error;
 }

@@ -61,6 +61,11 @@ struct pt_plan;
 int pt_frame_share_planes(const struct patina_frame *frame, struct pt_plan *plan);
 int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scene,
                      struct pt_plan *plan); // on the frame's planes
+// What is begun, over and over while it ends with PT_AGAIN: each time more pages are known to be damaged, and left out. `what` it is, for
+// the message of a cancelled one; of others the frame keeps the thread's.
+typedef int pt_frame_job(struct patina_frame *frame, const struct patina_scene *scene, const void *of);
+int pt_frame_until_sound(struct patina_frame *frame, const struct patina_scene *scene, const char *what, pt_frame_job *once,
+                         const void *of);
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);

@@ -133,8 +133,9 @@ int pt_frame_share_planes(const struct patina_frame *frame, struct pt_plan *plan
     return pt_plan_share_planes(plan, &abilities, frame->planes.apart);
 }
 
-static int draw_once(struct patina_frame *frame, const struct patina_scene *scene)
+static int draw_once(struct patina_frame *frame, const struct patina_scene *scene, const void *of)
 {
+    (void)of;
     struct pt_plan plan;
     const double start = pt_milliseconds();
     int error = pt_plan_create(scene, &plan);
@@ -143,7 +144,7 @@ static int draw_once(struct patina_frame *frame, const struct patina_scene *scen
     if (!error && frame->merge && (error = pt_merge_begin(frame->merge, scene, &plan)))
         pt_plan_destroy(&plan);
     if (error)
-        return pt_fail_again(&frame->handle, error);
+        return error;
     pt_note_time(&frame->times, "plan", pt_milliseconds() - start);
     frame->keys_valid = 0;
     link_planes(frame);
@@ -157,17 +158,22 @@ static int draw_once(struct patina_frame *frame, const struct patina_scene *scen
     if (!error)
         keep_statistics(frame, scene, &plan, pt_milliseconds() - start);
     pt_plan_destroy(&plan);
-    if (error == PATINA_ERROR_CANCELLED)
-        return pt_fail(&frame->handle, error, "rendering was cancelled");
-    return error == PT_AGAIN ? error : error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+    return error;
 }
 
-// Each time over there are more pages that are known to be damaged, and left out.
 int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
+{
+    return pt_frame_until_sound(frame, scene, "rendering", draw_once, NULL);
+}
+
+int pt_frame_until_sound(struct patina_frame *frame, const struct patina_scene *scene, const char *what, pt_frame_job *once,
+                         const void *of)
 {
     int error;
     do
-        error = draw_once(frame, scene);
+        error = once(frame, scene, of);
     while (error == PT_AGAIN);
-    return error;
+    if (error == PATINA_ERROR_CANCELLED)
+        return pt_fail(&frame->handle, error, "%s was cancelled", what);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }

@@ -214,19 +214,26 @@ static int begin(struct part_job *job, struct pt_keys_head *head)
     return PATINA_OK;
 }
 
-static int scatter_once(struct patina_frame *frame, const struct patina_scene *scene, const patina_part *part, const char *path)
+struct part_file {
+    const patina_part *part;
+    const char *path;
+};
+
+static int scatter_once(struct patina_frame *frame, const struct patina_scene *scene, const void *of)
 {
+    const struct part_file *file = of;
+    const patina_part *part = file->part;
     struct part_job job = {.frame = frame, .scene = scene, .part = part, .planes = {.varies = 1}};
     struct pt_keys_head head;
     frame->times.count = 0;
     frame->pager = (struct pt_pager){.cancel = &frame->cancel};
     int error = pt_plan_create(scene, &job.plan);
     if (error)
-        return pt_fail_again(&frame->handle, error);
+        return error;
     pt_plan_set_bins(&job.plan, frame->device->bin_threads, 0);
     error = begin(&job, &head);
     if (!error)
-        error = pt_key_writer_begin(&job.writer, &frame->handle, path, &head, part->note);
+        error = pt_key_writer_begin(&job.writer, &frame->handle, file->path, &head, part->note);
     if (!error) {
         error = pt_pager_open(&frame->pager, frame->device, scene);
         if (!error) {
@@ -238,19 +245,15 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
     pt_key_file_close(&job.before);
     pt_planes_release(frame->device, &job.planes);
     pt_plan_destroy(&job.plan);
-    if (error == PATINA_ERROR_CANCELLED)
-        return pt_fail(&frame->handle, error, "scattering was cancelled");
-    return error == PT_AGAIN ? error : error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+    return error;
 }
 
 int pt_frame_scatter(struct patina_frame *frame, const struct patina_scene *scene, const patina_part *part, const char *path)
 {
     struct patina_scene whole = *scene; // its handle is not touched
-    int error;
+    const struct part_file file = {part, path};
     whole.in_parts = 1;
-    do
-        error = scatter_once(frame, &whole, part, path);
-    while (error == PT_AGAIN);
+    const int error = pt_frame_until_sound(frame, &whole, "scattering", scatter_once, &file);
     atomic_store(&frame->cancel, 0);
     return error;
 }
