@@ -10,13 +10,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_FILES = 32, MAX_NAME = 64, LOG_SIZE = 4096 };
+// Lines are numbered across files: #line's second number, which file it is, Mesa forgets of what it finds behind the syntax.
+enum { MAX_FILES = 32, MAX_NAME = 64, LOG_SIZE = 4096, LINES_A_FILE = 10000 };
 
 struct source {
     char *text;
     const char *body; // what #include "BODY" stands for; NULL: nothing
     size_t length, capacity;
-    char files[MAX_FILES][MAX_NAME]; // number in #line = index
+    char files[MAX_FILES][MAX_NAME]; // lines of file i are numbered from LINES_A_FILE i on
     unsigned file_count;
 };
 
@@ -39,7 +40,7 @@ static int append(struct source *s, const char *text, size_t length)
 static int append_line_number(struct source *s, unsigned line, unsigned file)
 {
     char text[48];
-    int length = snprintf(text, sizeof text, "#line %u %u\n", line, file);
+    int length = snprintf(text, sizeof text, "#line %u\n", LINES_A_FILE * file + line);
     return append(s, text, (size_t)length);
 }
 
@@ -136,7 +137,7 @@ static int add_file(struct pt_gl_device *d, struct source *s, const char *name, 
 // Drivers write "0:12(3): error: ..." (Mesa, Intel), "0(12) : error ..." (NVIDIA) or "ERROR: 0:12: ..." (AMD).
 static int fail_with_log(struct pt_gl_device *d, const struct source *s, char *log)
 {
-    unsigned file, line;
+    unsigned shader, line;
     int after = 0;
     char *text = strstr(log, "error"); // warnings may come first
     text = text ? text : strstr(log, "ERROR");
@@ -145,9 +146,9 @@ static int fail_with_log(struct pt_gl_device *d, const struct source *s, char *l
         text--;
     text[strcspn(text, "\n")] = 0;
     text += strncmp(text, "ERROR: ", 7) ? 0 : 7;
-    if ((sscanf(text, "%u:%u%n", &file, &line, &after) == 2 || sscanf(text, "%u(%u%n", &file, &line, &after) == 2) &&
-        file < s->file_count)
-        return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shaders/%s:%u: %s", s->files[file], line,
+    if ((sscanf(text, "%u:%u%n", &shader, &line, &after) == 2 || sscanf(text, "%u(%u%n", &shader, &line, &after) == 2) &&
+        line / LINES_A_FILE < s->file_count)
+        return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shaders/%s:%u: %s", s->files[line / LINES_A_FILE], line % LINES_A_FILE,
                           text + after + strspn(text + after, "():0123456789 "));
     return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shader %s: %s", s->files[0], *text ? text : "the driver gives no reason");
 }

@@ -9,6 +9,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 struct show {
     const char *name;
@@ -42,7 +44,7 @@ static const struct show rows[] = {
       .paper_grain = 0.1f},
      0.05f},
 };
-enum { ROWS = sizeof rows / sizeof rows[0], MOST = 64, ALL = ROWS - 1 };
+enum { ROWS = sizeof rows / sizeof rows[0], MOST = 64, FOG = 6, ALL = ROWS - 1 };
 
 static struct show shows[MOST];
 static uint32_t show_count;
@@ -359,6 +361,54 @@ static void test_refusals(void **state)
     patina_scene_destroy(scene);
 }
 
+#ifndef _WIN32
+static void expect_error(const char *name, const char *wanted)
+{
+    patina_device *device = support_device_open(name, 0, 0);
+    if (!device)
+        return;
+    struct stage stage = build(0, FOG);
+    patina_frame *frame = NULL;
+    CHECK(patina_frame_create(device, &frame), device);
+    CHECK(patina_scene_set_camera(stage.scene, &stage.camera), stage.scene);
+    CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
+    assert_int_equal(patina_frame_render(frame, stage.scene), PATINA_ERROR_DEVICE);
+    if (!strstr(support_message(frame), wanted))
+        support_die("%s: '%s' should hold '%s'", name, support_message(frame), wanted);
+    patina_frame_destroy(frame);
+    stage_free(&stage);
+    patina_device_destroy(device);
+}
+
+// What a driver does not understand is told by the file and line where it stands, syntax or not, included or not.
+static void test_shader_errors(void **state)
+{
+    (void)state;
+    static const char *const bodies[] = {"\n\nPT_BODY(fog) { color[0] = HERE.nothing; }\n",
+                                         "\n\nPT_BODY(fog) { color[0] = ; }\n"};
+    char folder[] = "/tmp/patina-shaders-XXXXXX", inner[64], path[80];
+    if (!mkdtemp(folder))
+        support_die("no folder");
+    snprintf(inner, sizeof inner, "%s/pointwise", folder);
+    snprintf(path, sizeof path, "%s/fog.h", inner);
+    assert_int_equal(mkdir(inner, 0700), 0);
+    setenv("PATINA_SHADER_DIR", folder, 1);
+    for (uint32_t i = 0; i < 2; i++) {
+        FILE *file = fopen(path, "w");
+        assert_non_null(file);
+        fputs(bodies[i], file);
+        fclose(file);
+        for (uint32_t k = 0; k < support_device_count(); k++)
+            if (support_is_gl(support_device_name(k)))
+                expect_error(support_device_name(k), "shaders/pointwise/fog.h:3: ");
+    }
+    unsetenv("PATINA_SHADER_DIR");
+    remove(path);
+    rmdir(inner);
+    rmdir(folder);
+}
+#endif
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
@@ -368,6 +418,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_devices),          cmocka_unit_test(test_nothing_else_changes),
         cmocka_unit_test(test_refusals),         cmocka_unit_test(test_one_by_one),
         cmocka_unit_test(test_passes_asked_for),
+#ifndef _WIN32
+        cmocka_unit_test(test_shader_errors),
+#endif
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
