@@ -134,17 +134,18 @@ static double value_of(const struct kind *kind, const char *column, uint64_t i)
 static void put(FILE *out, const char *type, double value, int swap)
 {
     unsigned char bytes[8];
-    size_t size = 4;
-    const float f = (float)value;
-    const int16_t s = (int16_t)value;
-    memcpy(bytes, &f, 4);
-    if (!strcmp(type, "double"))
+    size_t size;
+    if (!strcmp(type, "double")) {
         memcpy(bytes, &value, size = 8);
-    if (strstr(type, "short"))
-        memcpy(bytes, &s, size = 2);
-    if (!strcmp(type, "uchar")) {
+    } else if (strstr(type, "short")) {
+        const int16_t whole = (int16_t)value;
+        memcpy(bytes, &whole, size = 2);
+    } else if (!strcmp(type, "uchar")) {
         bytes[0] = (unsigned char)value;
         size = 1;
+    } else {
+        const float narrow = (float)value;
+        memcpy(bytes, &narrow, size = 4);
     }
     for (size_t k = 0; k < size; k++)
         fputc(bytes[swap ? size - 1 - k : k], out);
