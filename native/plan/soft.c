@@ -53,7 +53,8 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
     if (!pt_kind_bounds(p->eye, PT_AS_SOFT, &what, chunk, rows, translation, &extent))
         return PATINA_OK;
     const struct patina_cloud *cloud = out->instance->cloud;
-    if (!pt_plan_page(p->scene, cloud, (uint32_t)(chunk - cloud->chunks), p->eye, object, &extent))
+    const uint32_t c = (uint32_t)(chunk - cloud->chunks);
+    if (!pt_plan_page(cloud, c, p->eye, object, &extent))
         return PATINA_OK;
     const double pixel = (double)plan->view.footprint * (plan->view.perspective ? fabs(extent.z_beyond) : 1.0) *
                          (double)PT_SOFT_LEAST;
@@ -62,7 +63,7 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
     p->seen[p->seen_count++] = own;
     struct pt_bounds *bounds = &out->bounds[out->chunk_count];
     struct chunk_view *view = &out->chunks[out->chunk_count];
-    if (!pt_rect_in_window(&plan->view, extent.rect, 0, bounds->rect))
+    if (!pt_plan_is_sound(p->scene, cloud, c) || !pt_rect_in_window(&plan->view, extent.rect, 0, bounds->rect))
         return PATINA_OK;
     bounds->z_far = own.beyond;
     depths[out->chunk_count++] = own;

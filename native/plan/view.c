@@ -176,7 +176,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         double left_out, rim;
         if (!pt_detail_draws(&detail, chunk, pixel * before / object->scale, &left_out))
             continue;
-        if (!pt_plan_page(scene, cloud, c, camera, object, &seen.extent))
+        if (!pt_plan_page(cloud, c, camera, object, &seen.extent))
             continue;
         const double stretch = stretch_of(camera, &seen.extent, &rim);
         for (int k = 0; k < 4; k++)
@@ -294,6 +294,15 @@ static void set_view(const struct pt_eye *camera, struct view_args *view)
 
 // ---- what kernels get ----------------------------------------------------------------------------------------------------
 
+// The pixels or cells that its points may fall into.
+static void set_place(struct chunk_view *out, const uint32_t rect[4])
+{
+    out->column_first = rect[0];
+    out->row_first = rect[1];
+    out->column_end = rect[2];
+    out->row_end = rect[3];
+}
+
 // A chunk of instance i, as it was placed for the coarser cells, in the finer ones.
 static void place_fine(const struct survey *survey, uint32_t i, const struct pt_chunk *chunk, const double bounds[4],
                        uint32_t guard, struct pt_range *fine, const struct chunk_view *placed)
@@ -307,8 +316,7 @@ static void place_fine(const struct survey *survey, uint32_t i, const struct pt_
     pt_set_product(rows, translation, out->row, out->hi, out->lo);
     pt_range_rect(fine, bounds, guard, cells);
     pt_join_rect(fine->cells.rect, cells);
-    out->row_first = cells[1];
-    out->row_end = cells[3];
+    set_place(out, cells);
 }
 
 // Instance i of the scene, its wide chunks or the others. Ids are moved by id_base. range: its image buffer, in whose cells points
@@ -344,7 +352,8 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         const double *bounds = seen->extent.rect,
                      around[4] = {bounds[0] - faces, bounds[1] - faces, bounds[2] + faces, bounds[3] + faces};
         uint32_t *rect = out->bounds[out->chunk_count].rect, cells[4];
-        if (seen->wide != (kind != PT_AS_POINTS) || !pt_rect_in_window(&plan->view, around, plan->guard, rect))
+        if (seen->wide != (kind != PT_AS_POINTS) || !pt_plan_is_sound(scene, instance->cloud, seen->chunk) ||
+            !pt_rect_in_window(&plan->view, around, plan->guard, rect))
             continue;
         uint32_t count = pt_drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
@@ -354,8 +363,9 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
             pt_range_rect(range, bounds, plan->guard, cells);
             pt_join_rect(range->cells.rect, cells);
         }
-        out->chunks[out->chunk_count].row_first = range ? cells[1] : rect[1];
-        out->chunks[out->chunk_count].row_end = range ? cells[3] : rect[3];
+        const float before = nextafterf((float)seen->extent.z_before, -INFINITY);
+        out->chunks[out->chunk_count].z_least = before > 0.0f ? before : 0.0f; // nor what is not a number
+        set_place(&out->chunks[out->chunk_count], range ? cells : rect);
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
             return PATINA_ERROR_MEMORY;
         for (struct pt_range *fine = range ? range->fine : NULL; fine; fine = fine->fine)

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pager.h"
 
+#include "hiding.h"
 #include "page_check.h"
 
 #include "base/platform.h"
 #include "residency.h"
 #include "scene/page_sums.h"
+#include "shared/points.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -14,6 +16,9 @@ enum {
     SHARE = 3,     // of the free memory
     OWN_SHARE = 3, // of OWN_OF parts of a device's own memory: planes need the rest
     OWN_OF = 4,
+    HIDING_STEPS = 16,      // of scatter: later ones leave out what those before them hide
+    HIDING_LEAST = 1 << 20, // bytes a step
+    HIDING_HOLDS = 2, // times what it reads: the system maps what lies beside it in the file, which is not of the same step
     LEAST = 64 << 20, // bytes, however little is free: less would be read over and over
     ROUNDS_A_CAP = 2, // the last round's pages and this one's
     FULL_EIGHTHS = 7, // from here on all is given back: threads read on meanwhile
@@ -173,16 +178,6 @@ static int check_lists(struct pt_pager *pager, const struct pt_pass *pass, const
     return found;
 }
 
-// A range of them; where some of it is damaged, all others too, for the picture is planned once more then.
-static int check_range(struct pt_pager *pager, const struct pt_pass *pass, const struct pt_chunk_list *lists, uint32_t count,
-                       const struct pt_chunk_range *range)
-{
-    const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, NULL, NULL};
-    const int found = pt_check_range(&how, lists, range);
-    const int more = found == PT_AGAIN ? check_lists(pager, pass, lists, count) : PATINA_OK;
-    return more < 0 ? more : found;
-}
-
 static int check_clouds(const struct pt_pager *pager)
 {
     const struct pt_check how = {UINT32_MAX, pager->cancel, NULL, NULL};
@@ -284,6 +279,8 @@ static void expect(const struct pt_chunk_list *lists, uint32_t count, const stru
         for (uint32_t c = first; c < end;) {
             const struct chunk_view *chunk = &lists[i].chunks[c++];
             uint64_t slots = (uint64_t)chunk->first + chunk->padded;
+            if (!chunk->padded) // hidden
+                continue;
             for (; c < end && lists[i].chunks[c].first == slots && lists[i].chunks[c].cull == chunk->cull; c++)
                 slots += lists[i].chunks[c].padded;
             pt_cloud_expect(lists[i].cloud, lists[i].arrays & ~(chunk->cull ? 0 : lists[i].culled), chunk->first, slots);
@@ -292,42 +289,84 @@ static void expect(const struct pt_chunk_list *lists, uint32_t count, const stru
 }
 
 struct bound {
-    struct pt_chunk_list *lists;
+    const struct pt_chunk_list *lists;
     struct pt_buffer *parts; // of the lists
     struct pt_buffer **buffers;
     uint32_t count;
+    uint64_t most;           // bytes that a range reads
+    struct pt_hiding hiding; // no lists: nothing is hidden
 };
+
+// Those that ranges are of.
+static const struct pt_chunk_list *drawn_lists(const struct bound *bound)
+{
+    return bound->hiding.lists ? bound->hiding.lists : bound->lists;
+}
+
+// Where all fits, the kernel alone leaves out what is hidden: steps take scatter a tenth longer.
+static int hides(const struct pt_pager *pager, const struct pt_pass *pass, uint64_t bytes)
+{
+    return pager->cap && pass->kernel == PT_KERNEL_scatter && bytes >= (uint64_t)HIDING_STEPS * HIDING_LEAST;
+}
+
+static void begin_hiding(const struct pt_pass *pass, struct pt_buffer *const *buffers, uint64_t bytes, struct bound *bound)
+{
+    if (!pt_hiding_begin(&bound->hiding, bound->lists, bound->count))
+        return;
+    bound->most = lesser(bound->most, bytes / HIDING_STEPS);
+    bound->hiding.keys = buffers[PT_BUF_scatter_keys]->data;
+    bound->hiding.width = ((const struct scatter_args *)pass->arguments)->view.width;
+}
+
+static int next_range(const struct bound *bound, struct pt_chunk_range *range)
+{
+    return bound->hiding.lists ? pt_hiding_next(&bound->hiding, bound->most, range)
+                               : pt_next_range(bound->lists, bound->count, bound->most, range);
+}
 
 static int run_range(const struct bound *bound, struct pt_buffer *const *whole, const struct pt_chunk_range *range,
                      pt_run_bound *run, void *context)
 {
+    const struct pt_chunk_list *lists = drawn_lists(bound);
     for (uint32_t i = 0; i < bound->count; i++) {
-        const struct pt_chunk_list *list = &bound->lists[i];
+        const struct pt_chunk_list *list = &lists[i];
         uint32_t first, end;
-        part_of(bound->lists, range, i, &first, &end);
+        part_of(lists, range, i, &first, &end);
         bound->parts[i] = *whole[list->ref];
-        bound->parts[i].data = (char *)bound->parts[i].data + first * sizeof *list->chunks;
+        bound->parts[i].data = (void *)(uintptr_t)(list->chunks + first); // which kernels only read
         bound->parts[i].size = (end - first) * sizeof *list->chunks;
         bound->buffers[list->ref] = &bound->parts[i];
     }
     return run(context, bound->buffers);
 }
 
-// One after another; while one is drawn, the disk reads the next.
+// What is damaged of a range: where something is, all others are looked at too, for the picture is planned once more then.
+static int check_range(struct pt_pager *pager, const struct pt_pass *pass, const struct bound *bound,
+                       const struct pt_chunk_range *range)
+{
+    const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, NULL, NULL};
+    const int found = pt_check_range(&how, drawn_lists(bound), range);
+    const int more = found == PT_AGAIN ? check_lists(pager, pass, bound->lists, bound->count) : PATINA_OK;
+    return more < 0 ? more : found;
+}
+
+// One after another; while one is drawn, the disk reads the next, which the keys of the one before that left open.
 static int run_ranges(struct pt_pager *pager, const struct pt_pass *pass, const struct bound *bound,
                       struct pt_buffer *const *whole, pt_run_bound *run, void *context)
 {
+    const struct pt_chunk_list *lists = drawn_lists(bound);
     struct pt_chunk_range range = {0}, next;
-    int error = PATINA_OK, some = pt_next_range(bound->lists, bound->count, pager->round, &range);
-    expect(bound->lists, bound->count, &range);
+    int error = PATINA_OK, some = next_range(bound, &range);
+    expect(lists, bound->count, &range);
     while (some && !error) {
         next = range;
-        some = pt_next_range(bound->lists, bound->count, pager->round, &next);
+        some = next_range(bound, &next);
         if (some)
-            expect(bound->lists, bound->count, &next);
-        make_room(pager, range.bytes);
-        error = check_range(pager, pass, bound->lists, bound->count, &range);
+            expect(lists, bound->count, &next);
+        make_room(pager, bound->hiding.lists ? HIDING_HOLDS * range.bytes : range.bytes);
+        error = check_range(pager, pass, bound, &range);
         error = error ? error : run_range(bound, whole, &range, run, context);
+        pager->read += range.bytes;
         range = next;
     }
     return error;
@@ -338,34 +377,39 @@ int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struc
 {
     if (!pager || !pager->mapped || pager->device->copies) // which looks after its ranges itself
         return run(context, buffers);
-    struct bound bound = {.lists = calloc(pass->ref_count + 1u, sizeof *bound.lists)};
+    struct pt_chunk_list *lists = calloc(pass->ref_count + 1u, sizeof *lists);
+    struct bound bound = {.lists = lists, .most = pager->round};
     uint64_t bytes = 0;
     uint32_t ranges = 0;
-    if (bound.lists) {
-        bound.count = pt_pass_lists(plan, pass, bound.lists);
+    if (lists) {
+        bound.count = pt_pass_lists(plan, pass, lists);
         for (uint32_t i = 0; i < bound.count; i++) { // of a layer or a part they are not all that was planned
-            struct pt_chunk_list *list = &bound.lists[i];
+            struct pt_chunk_list *list = &lists[i];
             list->chunks = buffers[list->ref]->data ? buffers[list->ref]->data : list->chunks;
             list->count = (uint32_t)(buffers[list->ref]->size / sizeof *list->chunks);
         }
-        ranges = pt_count_ranges(bound.lists, bound.count, pager->cap ? pager->round : UINT64_MAX, &bytes);
-        pager->read += bytes;
+        ranges = pt_count_ranges(lists, bound.count, pager->cap ? pager->round : UINT64_MAX, &bytes);
         ranges = ranges > 1 && !pt_pass_divides(pass) ? 1 : ranges;
         pager->rounds = ranges > pager->rounds ? ranges : pager->rounds;
     }
-    if (ranges > 1) {
+    const int hiding = hides(pager, pass, bytes);
+    if (ranges > 1 || hiding) {
         bound.parts = calloc(bound.count, sizeof *bound.parts);
         bound.buffers = calloc(pass->ref_count, sizeof *bound.buffers);
     }
     int error;
     if (bound.parts && bound.buffers) {
         memcpy(bound.buffers, buffers, pass->ref_count * sizeof *bound.buffers);
+        if (hiding)
+            begin_hiding(pass, buffers, bytes, &bound);
         error = run_ranges(pager, pass, &bound, buffers, run, context);
     } else { // in one, which need not be held whole: whoever runs it looks after that
-        error = bound.lists ? check_lists(pager, pass, bound.lists, bound.count) : PATINA_OK;
+        pager->read += bytes;
+        error = lists ? check_lists(pager, pass, lists, bound.count) : PATINA_OK;
         error = error ? error : run(context, buffers);
     }
-    free(bound.lists);
+    pt_hiding_end(&bound.hiding);
+    free(lists);
     free(bound.parts);
     free(bound.buffers);
     return error;

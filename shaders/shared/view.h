@@ -67,6 +67,8 @@ struct chunk_view {
     uint32_t sifted; // 1 + its first drawn word; 0: all points are drawn
     uint32_t clip_first, clip_count, clip_keeps; // sift: its clips, and how many of them, the first, are PT_CLIP_KEEP
     uint32_t row_first, row_end; // of pixels that its points may fall into; both 0: not known
+    uint32_t column_first, column_end; // likewise
+    float z_least;               // no point of it is seen nearer; 0: not known
     uint32_t record;             // gather: where those of its points begin
 };
 

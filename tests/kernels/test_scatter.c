@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // scatter: the least key of every pixel, where the reference says which points may and which must be there.
 #include "points.h"
+#include "hidden.h"
 #include "shared/points.h"
 
 #include <math.h>
@@ -407,7 +408,6 @@ static void limits(struct harness *h)
     }
 }
 
-// No instance at all, and a plane that already holds something nearer.
 // The rows that the chunk's points may fall into.
 static void note_rows(const struct scene *scene, const struct cloud *cloud, struct chunk_view *chunk)
 {
@@ -423,6 +423,27 @@ static void note_rows(const struct scene *scene, const struct cloud *cloud, stru
     chunk->row_end = chunk->row_end < scene->view.height ? chunk->row_end : scene->view.height;
     if (chunk->row_first >= chunk->row_end)
         chunk->row_first = chunk->row_end = 0;
+}
+
+// And their columns, and the least depth.
+static void note_place(const struct scene *scene, const struct cloud *cloud, struct chunk_view *chunk)
+{
+    double least = INFINITY;
+    note_rows(scene, cloud, chunk);
+    chunk->column_first = scene->view.width;
+    for (uint32_t s = 0; s < chunk->count; s++) {
+        struct ref_splat splat = ref_scatter(&scene->view, chunk, cloud->positions, cloud->surfels, s);
+        if (!splat.possible)
+            continue;
+        const uint32_t first = splat.x0 < 0 ? 0 : (uint32_t)splat.x0, end = (uint32_t)splat.x1 + 1;
+        chunk->column_first = first < chunk->column_first ? first : chunk->column_first;
+        chunk->column_end = end > chunk->column_end ? end : chunk->column_end;
+        least = fmin(least, splat.z.lo);
+    }
+    chunk->column_end = chunk->column_end < scene->view.width ? chunk->column_end : scene->view.width;
+    if (chunk->column_first >= chunk->column_end)
+        chunk->column_first = chunk->column_end = 0;
+    chunk->z_least = least < INFINITY ? fmaxf(float_step((float)least, -1), 0.0f) : 0.0f;
 }
 
 // Chunks that say where they fall: most into a few rows, some across all, some do not say.
@@ -461,6 +482,82 @@ static void rows_known(struct harness *h)
     }
 }
 
+// A wall, and behind it, in front of it and through it what may be hidden.
+static void hidden(struct harness *h)
+{
+    enum { WIDTH = 67, HEIGHT = 45 };
+    uint64_t *keys = harness_alloc(h, sizeof *keys * WIDTH * HEIGHT);
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+        keys[i] = ref_key(3.0f, 0xFFFFFFFEu);
+    struct chunk_view chunk = {.count = 100, .column_first = 3, .column_end = 13, .row_first = 35, .row_end = 45};
+    const float depths[] = {0.0f, 0x1p-126f, 2.0f, float_step(3.0f, -1), 3.0f, float_step(3.0f, 1), 4.0f, INFINITY};
+    for (uint32_t i = 0; i < sizeof depths / sizeof depths[0]; i++) { // of equal depths the numbers decide
+        chunk.z_least = depths[i];
+        HARNESS_CHECK(h, pt_is_hidden(&chunk, keys, WIDTH) == (depths[i] > 3.0f));
+    }
+    chunk.z_least = 4.0f;
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) { // a hole of one pixel, and a pixel as far as the chunk
+        const uint32_t x = i % WIDTH, y = i / WIDTH, within = x >= 3 && x < 13 && y >= 35;
+        for (int way = 0; way < 2; way++) {
+            keys[i] = way ? ref_key(4.0f, 0) : REF_EMPTY_KEY;
+            HARNESS_CHECK(h, pt_is_hidden(&chunk, keys, WIDTH) == !within);
+        }
+        keys[i] = ref_key(3.0f, 0);
+    }
+    chunk.count = 99; // fewer points than pixels
+    HARNESS_CHECK(h, !pt_is_hidden(&chunk, keys, WIDTH));
+    chunk.count = 100;
+    chunk.row_first = chunk.row_end = 0; // it does not say where it is
+    HARNESS_CHECK(h, !pt_is_hidden(&chunk, keys, WIDTH));
+    chunk.column_first = chunk.column_end = 0;
+    HARNESS_CHECK(h, !pt_is_hidden(&chunk, keys, WIDTH));
+}
+
+// Dense chunks one behind another that say where they are: keys as of those that do not.
+static void behind_a_wall(struct harness *h)
+{
+    enum { CHUNKS = 40 };
+    for (int way = 0; way < 4; way++) { // orthographic or not; with a layer before
+        const int p = way % 2;
+        struct rng rng = {70 + (uint64_t)way};
+        uint32_t counts[CHUNKS];
+        for (uint32_t c = 0; c < CHUNKS; c++)
+            counts[c] = c < 4 ? 20000 : 1500;
+        struct scene scene = {.view = points_window(67, 45, p, p ? 60.0 : 20.0)};
+        struct camera camera = points_look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
+        const double straight[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+        memcpy(camera.rotation, straight, sizeof straight);
+        struct cloud *cloud = points_add_cloud(h, &rng, &scene, &camera, counts, CHUNKS, 0, 0);
+        for (uint32_t c = 0; c < CHUNKS; c++) { // the nearest last, some at its depth
+            const int wall = c < 4;
+            const double depth = wall ? 0.0 : c % 9 ? -rng_range(&rng, 0.1, 8.0) : c % 2 ? 0.0 : 0.5;
+            const double x = wall ? (c % 2 ? 1.0 : -1.0) : rng_range(&rng, -2.0, 2.0),
+                         y = wall ? (c / 2 ? 0.7 : -0.7) : rng_range(&rng, -1.0, 1.0);
+            for (uint32_t i = 0; i < counts[c]; i++) {
+                const double wide = wall ? 1.02 : 0.2;
+                *points_coordinate(cloud, c, i, 0) = (float)(x + rng_range(&rng, -wide, wide));
+                *points_coordinate(cloud, c, i, 1) = (float)(y + 0.72 * rng_range(&rng, -wide, wide));
+                *points_coordinate(cloud, c, i, 2) = (float)depth;
+            }
+        }
+        float *limit = harness_alloc(h, (size_t)67 * 45 * sizeof *limit);
+        for (uint32_t i = 0; i < 67 * 45; i++)
+            limit[i] = i % 3 ? 4.0f : 3.4f;
+        scene.limit = way > 1 ? limit : NULL;
+        const uint64_t *unknown = run_scatter(h, &scene);
+        uint32_t behind = 0;
+        for (uint32_t c = 0; c < CHUNKS; c++)
+            note_place(&scene, cloud, &cloud->chunks[c]);
+        const uint64_t *known = check_scene(h, &scene);
+        for (uint32_t i = 0; i < 67 * 45; i++)
+            HARNESS_CHECK(h, known[i] == unknown[i]);
+        for (uint32_t c = 4; c < CHUNKS; c++)
+            behind += pt_is_hidden(&cloud->chunks[c], known, 67) != 0;
+        HARNESS_CHECK(h, behind > (way > 1 ? 0u : CHUNKS / 4));
+    }
+}
+
+// No instance at all, and a plane that already holds something nearer.
 static void nothing(struct harness *h)
 {
     struct scene scene = {.view = points_window(67, 45, 1, 60.0)};
@@ -503,6 +600,8 @@ int main(int argc, char **argv)
         {"behind a layer", limits, 0},
         {"sifted chunks", sifted, 0},
         {"chunks that know their rows", rows_known, 0},
+        {"what is hidden", hidden, 1},
+        {"chunks behind a wall", behind_a_wall, 0},
         {"nothing to draw", nothing, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);

@@ -492,6 +492,58 @@ static void test_low_parts(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// What is hidden is left out by where chunks may fall and how near they may lie: of every point that kernels would draw both hold, as
+// kernels reckon in float32.
+static void test_places_hold_points(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
+    uint32_t seed = 7, drawn = 0, known = 0, straddle = 0;
+    for (int i = 0; i < 100; i++) {
+        double at[2][3];
+        for (int k = 0; k < 6; k++) {
+            seed = seed * 1664525u + 1013904223u;
+            at[k / 3][k % 3] = (double)(seed >> 8) / (1 << 24) * (k % 3 == 2 ? 0.3 : 2.0) - (k % 3 == 2 ? -0.01 : 1.0);
+        }
+        look(scene, at[0], at[1]);
+        scene->camera.orthographic = i % 4 == 0;
+        struct pt_plan plan = plan_of(scene);
+        for (uint32_t n = 0; n < plan.instance_count; n++)
+            for (uint32_t c = 0; c < plan.instances[n].chunk_count; c++) {
+                const struct chunk_view *chunk = &plan.instances[n].chunks[c];
+                const float *p = cloud->positions + 3 * (size_t)chunk->first;
+                assert_true(chunk->column_first < chunk->column_end && chunk->column_end <= plan.view.width);
+                assert_true(chunk->row_first < chunk->row_end && chunk->row_end <= plan.view.height);
+                known += chunk->z_least > 0.0f;
+                straddle += !(chunk->z_least > 0.0f);
+                for (uint32_t s = 0; s < chunk->count; s++) {
+                    float q[3];
+                    for (int k = 0; k < 3; k++) {
+                        const float *r = chunk->row + 3 * k;
+                        q[k] = (((chunk->lo[k] + r[0] * p[s]) + r[1] * p[chunk->padded + s]) +
+                                r[2] * p[2 * chunk->padded + s]) +
+                               chunk->hi[k];
+                    }
+                    if (!(q[2] >= plan.view.z_near && q[2] <= plan.view.z_far && q[2] > 0.0f))
+                        continue;
+                    const float x = floorf(plan.view.perspective ? q[0] / q[2] : q[0]) - (float)plan.view.origin_x,
+                                y = floorf(plan.view.perspective ? q[1] / q[2] : q[1]) - (float)plan.view.origin_y;
+                    if (!(x >= 0.0f && x < (float)plan.view.width && y >= 0.0f && y < (float)plan.view.height))
+                        continue;
+                    drawn++;
+                    assert_true(q[2] > chunk->z_least);
+                    assert_true(x >= (float)chunk->column_first && x < (float)chunk->column_end);
+                    assert_true(y >= (float)chunk->row_first && y < (float)chunk->row_end);
+                }
+            }
+        pt_plan_destroy(&plan);
+    }
+    assert_true(drawn > 10000 && known > 100 && straddle > 10);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 // The ground below and behind a camera does not show: what is filled is chosen by what does, 12 to 28 pixels apart.
 static void test_spacing_is_of_what_shows(void **state)
 {
@@ -849,6 +901,7 @@ int main(void)
         cmocka_unit_test(test_planes_share_memory),
         cmocka_unit_test(test_bins_of_discs),
         cmocka_unit_test(test_low_parts),
+        cmocka_unit_test(test_places_hold_points),
         cmocka_unit_test(test_chunks_around_the_camera),
         cmocka_unit_test(test_spacing_is_of_what_shows),
         cmocka_unit_test(test_nothing_in_view_is_said),

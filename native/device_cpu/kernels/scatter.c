@@ -7,11 +7,13 @@
 // gathered depth test. 1M points on two cores: 1.2 ms in place of 1.5. The minimum commutes, so neither threads nor batches
 // show.
 #include "device_cpu/cpu.h"
-#include "device_cpu/cpu.h"
 #include "device_cpu/points.h"
+#include "hidden.h"
 #include "shared/points.h"
 
 enum { BINS = 256 }; // of rows
+// Steps of z from which on, eight times as far, chunks are put in order: less deep, what lies beside each other stays so.
+enum { DEEP = 7 };
 
 struct stripe { // its chunks, of scatter.order
     uint32_t next, end;
@@ -22,7 +24,8 @@ struct scatter {
     const struct scatter_args *args;
     uint32_t *begins;       // see pt_chunk_begins
     struct stripe *stripes; // one a thread, and one of those last
-    uint32_t *order;        // chunks by stripes; last those across several
+    uint32_t *order;        // chunks by stripes, from near to far; last those across several
+    uint32_t *by_depth;     // all of them
     atomic_int over;        // a stripe is done
 };
 
@@ -147,6 +150,8 @@ static const struct chunk_view *chunk_at(const struct scatter *scatter, uint32_t
 static void walk_chunk(const struct scatter *scatter, uint32_t c, struct walk *walk)
 {
     const struct chunk_view *chunk = chunk_at(scatter, c, &walk->instance);
+    if (pt_is_hidden(chunk, walk->target.keys, scatter->args->view.width))
+        return;
     const float *positions = (const float *)PT_DATA_EACH(scatter->call, scatter, positions, walk->instance) +
                              3 * (size_t)chunk->first;
     const uint32_t *surfels = (const uint32_t *)PT_DATA_EACH(scatter->call, scatter, surfels, walk->instance) + chunk->first;
@@ -221,6 +226,23 @@ static uint32_t stripe_of_chunk(const struct scatter *scatter, const struct chun
     return first == last ? first : stripes;
 }
 
+// From near to far, so that what lies behind finds the keys of what hides it; within a step those beside each other stay so.
+static void order_chunks(const struct scatter *scatter, uint32_t chunks)
+{
+    uint32_t next[PT_DEPTHS + 1] = {0};
+    for (uint32_t c = 0, instance = 0; c < chunks; c++)
+        next[pt_depth_step(chunk_at(scatter, c, &instance)) + 1]++;
+    uint32_t first = 1, last = PT_DEPTHS - 1; // of those that are known
+    while (first < last && !next[first + 1])
+        first++;
+    while (last > first && !next[last + 1])
+        last--;
+    for (uint32_t depth = 0; depth < PT_DEPTHS; depth++)
+        next[depth + 1] = last - first < DEEP ? 0 : next[depth + 1] + next[depth];
+    for (uint32_t c = 0, instance = 0; c < chunks; c++)
+        scatter->by_depth[last - first < DEEP ? c : next[pt_depth_step(chunk_at(scatter, c, &instance))]++] = c;
+}
+
 static void sort_chunks(struct scatter *scatter, uint32_t chunks, uint32_t stripes)
 {
     uint16_t stripe_of[BINS];
@@ -233,7 +255,9 @@ static void sort_chunks(struct scatter *scatter, uint32_t chunks, uint32_t strip
         first += scatter->stripes[s].end;
         scatter->stripes[s].end = scatter->stripes[s].next;
     }
-    for (uint32_t c = 0, instance = 0; c < chunks; c++) {
+    order_chunks(scatter, chunks);
+    for (uint32_t i = 0, instance = 0; i < chunks; i++) {
+        const uint32_t c = scatter->by_depth[i];
         struct stripe *stripe =
             &scatter->stripes[stripe_of_chunk(scatter, chunk_at(scatter, c, &instance), stripes, stripe_of)];
         scatter->order[stripe->end++] = c;
@@ -251,10 +275,12 @@ int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
         return PATINA_ERROR_MEMORY;
     pt_chunk_begins(call, PT_BUF_scatter_chunks, PT_EACH_scatter, args->instances, scatter.begins);
     const uint32_t chunks = scatter.begins[args->instances];
-    scatter.stripes = pt_cpu_scratch(call, 1, (stripes + 1) * sizeof *scatter.stripes + chunks * sizeof *scatter.order);
+    scatter.stripes = pt_cpu_scratch(call, 1,
+                                     (stripes + 1) * sizeof *scatter.stripes + 2 * (size_t)chunks * sizeof *scatter.order);
     if (!scatter.stripes)
         return PATINA_ERROR_MEMORY;
     scatter.order = (uint32_t *)(void *)(scatter.stripes + stripes + 1);
+    scatter.by_depth = scatter.order + chunks;
     sort_chunks(&scatter, chunks, stripes);
     pt_parallel(call->pool, stripes, 1, scatter_stripes, &scatter);
     for (uint32_t s = 0; s <= stripes; s++)
