@@ -3,6 +3,8 @@
 
 #include "slots.h"
 
+#include "shared/points.h"
+
 int pt_pass_divides(const struct pt_pass *pass)
 {
     switch (pass->kernel) {
@@ -13,6 +15,22 @@ int pt_pass_divides(const struct pt_pass *pass)
     case PT_KERNEL_gather: return 1;
     default: return 0; // sums that end in a mean, or bins that the next pass takes up
     }
+}
+
+enum pt_pass_role pt_pass_role(const struct pt_pass *pass)
+{
+    switch (pass->kernel) {
+    case PT_KERNEL_sift: return PT_ROLE_SIEVE;
+    case PT_KERNEL_scatter: return PT_ROLE_KEYS;
+    case PT_KERNEL_splat: return PT_ROLE_SURFACE;
+    default: return PT_ROLE_NONE;
+    }
+}
+
+uint32_t pt_pass_keys(const struct pt_pass *pass, uint32_t *width)
+{
+    *width = ((const struct scatter_args *)pass->arguments)->view.width;
+    return PT_BUF_scatter_keys;
 }
 
 static uint32_t array_bit(enum pt_instance_buffer which, const struct patina_cloud *cloud)

@@ -27,6 +27,18 @@ static inline uint64_t pt_share_before(const patina_part *part, uint64_t to, uin
 
 // Whether the pass comes to the same by ranges of chunks in turn: it takes a minimum, or writes what belongs to its chunks alone.
 int pt_pass_divides(const struct pt_pass *pass);
+// What a pass is to those that divide a picture's points, over rounds or machines, and know no kernel.
+enum pt_pass_role {
+    PT_ROLE_NONE,    // pixels, or points that no other machine knows of
+    PT_ROLE_SIEVE,   // which points of the chunks at hand are drawn
+    PT_ROLE_KEYS,    // least keys of points, and nothing else
+    PT_ROLE_SURFACE, // least keys of points, and what they show
+};
+enum pt_pass_role pt_pass_role(const struct pt_pass *pass);
+// Of a pass whose role is PT_ROLE_KEYS: which of its references the keys are, and how many of them a row has.
+uint32_t pt_pass_keys(const struct pt_pass *pass, uint32_t *width);
+// Whether it writes least keys of points.
+static inline int pt_is_of_parts(const struct pt_pass *pass) { return pt_pass_role(pass) >= PT_ROLE_KEYS; }
 // The lists of a pass, all their chunks; lists: room for as many as the pass has references. Returns how many.
 uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, struct pt_chunk_list *lists);
 // The next range, of no more bytes than `most` but of one chunk at least; 0: there is none. *range: the last one, or zero.

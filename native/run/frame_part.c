@@ -81,7 +81,7 @@ static int write_keys(struct part_job *job, struct pt_execution *e, const struct
 
 static int is_run(const struct pt_pass *pass, uint32_t layer)
 {
-    return pass->kernel == PT_KERNEL_sift || (pt_is_of_parts(pass) && pass->layer == layer);
+    return pt_pass_role(pass) == PT_ROLE_SIEVE || (pt_is_of_parts(pass) && pass->layer == layer);
 }
 
 // The share's damaged pages, where the device reads in ranges.
@@ -108,7 +108,7 @@ static int run_points(struct part_job *job, struct pt_execution *e, uint32_t lay
         error = look_at_share(job, e, layer);
     for (uint32_t i = 0; i < plan->pass_count && !error; i++) {
         const struct pt_pass *pass = &plan->passes[i];
-        if (pass->kernel == PT_KERNEL_sift)
+        if (pt_pass_role(pass) == PT_ROLE_SIEVE)
             error = pt_run_passes(e, i, 1);
         if (error || !pt_is_of_parts(pass) || pass->layer != layer)
             continue;

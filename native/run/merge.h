@@ -7,6 +7,8 @@
 #include "binder.h"
 #include "key_file.h"
 
+#include "plan/rounds.h"
+
 struct pt_merge {
     const struct pt_handle *handle; // messages are there
     struct pt_key_file *files;      // by round, and in a round by part
@@ -21,11 +23,6 @@ struct pt_merge {
 const char *pt_parts_refused(const struct patina_scene *scene, const struct pt_plan *plan);
 // What a picture's keys follow from, in 64 bits: of a plan as it was made. Points count by their chunks.
 uint64_t pt_parts_digest(const struct patina_scene *scene, const struct pt_plan *plan);
-// Whether a pass writes least keys of points.
-static inline int pt_is_of_parts(const struct pt_pass *pass)
-{
-    return pass->kernel == PT_KERNEL_scatter || pass->kernel == PT_KERNEL_splat;
-}
 // Ids that keys of the scene's points may have lie below.
 static inline uint64_t pt_parts_ids(const struct patina_scene *scene) { return 2 * scene->points + scene->triangles; }
 // Whose keys the pass's are; round: of the loops around a map.

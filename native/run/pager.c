@@ -7,7 +7,6 @@
 #include "base/platform.h"
 #include "residency.h"
 #include "scene/page_sums.h"
-#include "shared/points.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -234,7 +233,7 @@ void pt_pager_close(struct pt_pager *pager)
 int pt_pager_begin_pass(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass, const patina_part *part)
 {
     if (!pager || !pager->mapped || !pager->device->copies || !pager->cap ||
-        (pager->merged && pass->kernel == PT_KERNEL_scatter))
+        (pager->merged && pt_pass_role(pass) == PT_ROLE_KEYS))
         return PATINA_OK;
     struct pt_chunk_list *lists = calloc(pass->ref_count + 1u, sizeof *lists);
     if (!lists)
@@ -306,7 +305,7 @@ static const struct pt_chunk_list *drawn_lists(const struct bound *bound)
 // Where all fits, the kernel alone leaves out what is hidden: steps take scatter a tenth longer.
 static int hides(const struct pt_pager *pager, const struct pt_pass *pass, uint64_t bytes)
 {
-    return pager->cap && pass->kernel == PT_KERNEL_scatter && bytes >= (uint64_t)HIDING_STEPS * HIDING_LEAST;
+    return pager->cap && pt_pass_role(pass) == PT_ROLE_KEYS && bytes >= (uint64_t)HIDING_STEPS * HIDING_LEAST;
 }
 
 static void begin_hiding(const struct pt_pass *pass, struct pt_buffer *const *buffers, uint64_t bytes, struct bound *bound)
@@ -314,8 +313,7 @@ static void begin_hiding(const struct pt_pass *pass, struct pt_buffer *const *bu
     if (!pt_hiding_begin(&bound->hiding, bound->lists, bound->count))
         return;
     bound->most = lesser(bound->most, bytes / HIDING_STEPS);
-    bound->hiding.keys = buffers[PT_BUF_scatter_keys]->data;
-    bound->hiding.width = ((const struct scatter_args *)pass->arguments)->view.width;
+    bound->hiding.keys = buffers[pt_pass_keys(pass, &bound->hiding.width)]->data;
 }
 
 static int next_range(const struct bound *bound, struct pt_chunk_range *range)

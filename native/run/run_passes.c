@@ -55,7 +55,7 @@ static int run_pass(struct pt_execution *e, uint32_t i)
     const struct pt_pass *pass = &e->plan->passes[i];
     if (e->merge && pt_is_of_parts(pass)) {
         const int taken = pt_merge_take(e->merge, &e->binder, e->scene, pass, &e->round);
-        if (taken || pass->kernel == PT_KERNEL_scatter)
+        if (taken || pt_pass_role(pass) == PT_ROLE_KEYS)
             return taken;
         // what discs show follows: those before the settled depths are found once more, and no key changes
     }
