@@ -99,9 +99,9 @@ static void test_bytes_a_point(void **state)
     if (!anonymous_bytes())
         skip();
     measure(200000, POINTS_ALL, 0, 25.0, 60.0); // warms allocator and threads up; small clouds round up
-    measure(4000000, POINTS_ALL, 0, 24.0, 24.0 + 16.0);
-    measure(4000000, POINTS_PLAIN, 0, 24.0, 24.0 + 16.0);
-    measure(4000000, POINTS_ALL, 1, 24.0, 24.0 + 16.0);
+    measure(2000000, POINTS_ALL, 0, 24.0, 24.0 + 16.0);
+    measure(2000000, POINTS_PLAIN, 0, 24.0, 24.0 + 16.0);
+    measure(2000000, POINTS_ALL, 1, 24.0, 24.0 + 16.0);
 }
 
 int main(void)

@@ -51,6 +51,12 @@ static struct scan make_scan(void)
     return scan;
 }
 
+static void scan_free(struct scan *scan)
+{
+    free(scan->position);
+    free(scan->station);
+}
+
 static patina_cloud *make_cloud(const struct scan *scan, int free_space)
 {
     uint8_t *color = malloc(3 * scan->count);
@@ -70,6 +76,24 @@ static patina_cloud *make_cloud(const struct scan *scan, int free_space)
     CHECK(patina_cloud_analyse(cloud, &analysis, NULL), cloud);
     free(color);
     return cloud;
+}
+
+static patina_cloud *asked; // about its stations; all tests look at it
+
+static int make_asked(void **state)
+{
+    (void)state;
+    struct scan scan = make_scan();
+    asked = make_cloud(&scan, 1);
+    scan_free(&scan);
+    return 0;
+}
+
+static int free_asked(void **state)
+{
+    (void)state;
+    patina_cloud_destroy(asked);
+    return 0;
 }
 
 static patina_camera camera_at(int way)
@@ -150,15 +174,13 @@ static void test_slit(void **state)
 {
     static const double placed[16] = {0, -2, 0, 40, 2, 0, 0, -7, 0, 0, 2, 3, 0, 0, 0, 1};
     (void)state;
-    struct scan scan = make_scan();
-    patina_cloud *cloud = make_cloud(&scan, 1);
     const patina_settings settings = settings_of();
     for (uint32_t k = 0; k < support_device_count(); k++) {
         patina_device *device = support_device_open(support_device_name(k), 0, 0);
         for (int way = 0; device && way < 3; way++) {
-            struct picture off = draw(device, cloud, PATINA_FREE_SPACE_OFF, way, &settings, NULL);
-            struct picture used = draw(device, cloud, PATINA_FREE_SPACE_USE, way, &settings, NULL);
-            struct picture shown = draw(device, cloud, PATINA_FREE_SPACE_SHOW, way, &settings, NULL);
+            struct picture off = draw(device, asked, PATINA_FREE_SPACE_OFF, way, &settings, NULL);
+            struct picture used = draw(device, asked, PATINA_FREE_SPACE_USE, way, &settings, NULL);
+            struct picture shown = draw(device, asked, PATINA_FREE_SPACE_SHOW, way, &settings, NULL);
             const struct seen before = look(&off, way), after = look(&used, way), marked = look(&shown, way);
             assert_true(before.board > 50 && before.magenta == 0);
             // from beside, the wall ends where the slit hid it from the scanner, and some of the slit lies near the board's points
@@ -166,7 +188,7 @@ static void test_slit(void **state)
             assert_true(after.wall * (way == 1 ? 8 : 50) > before.board * (way == 1 ? 5 : 48));
             assert_true(marked.board == before.board &&
                         marked.magenta * (way == 1 ? 8 : 50) > before.board * (way == 1 ? 6 : 48));
-            struct picture turned = draw(device, cloud, PATINA_FREE_SPACE_USE, way, &settings, way < 2 ? placed : NULL);
+            struct picture turned = draw(device, asked, PATINA_FREE_SPACE_USE, way, &settings, way < 2 ? placed : NULL);
             const uint64_t pixels = WIDTH * HEIGHT;
             uint64_t differ = 0; // the object is placed twice as large
             for (uint64_t i = 0; i < pixels; i++)
@@ -180,9 +202,6 @@ static void test_slit(void **state)
         }
         patina_device_destroy(device);
     }
-    patina_cloud_destroy(cloud);
-    free(scan.position);
-    free(scan.station);
 }
 
 // Devices and threads alike; regions as the whole; through a file; and as ever for a cloud whose stations nobody asked.
@@ -190,20 +209,21 @@ static void test_alike(void **state)
 {
     (void)state;
     struct scan scan = make_scan();
-    patina_cloud *cloud = make_cloud(&scan, 1), *plain = make_cloud(&scan, 0), *opened = NULL;
+    patina_cloud *plain = make_cloud(&scan, 0), *opened = NULL;
+    scan_free(&scan);
     patina_settings settings = settings_of();
     struct picture first = {0};
     char path[] = "/tmp/reopened-XXXXXX";
     const int descriptor = mkstemp(path);
     assert_true(descriptor >= 0);
     close(descriptor); // Windows replaces no file that is open
-    CHECK(patina_cloud_save(cloud, path), cloud);
+    CHECK(patina_cloud_save(asked, path), asked);
     CHECK(patina_cloud_open(path, &opened), NULL);
     for (uint32_t k = 0; k < 2 * support_device_count(); k++) {
         patina_device *device = support_device_open(support_device_name(k / 2), k % 2 ? 1 : 3, 0);
         if (!device)
             continue;
-        struct picture picture = draw(device, k % 2 ? opened : cloud, PATINA_FREE_SPACE_USE, 1, &settings, NULL);
+        struct picture picture = draw(device, k % 2 ? opened : asked, PATINA_FREE_SPACE_USE, 1, &settings, NULL);
         if (!first.keys)
             first = picture;
         else
@@ -211,13 +231,13 @@ static void test_alike(void **state)
         patina_settings part = settings;
         const uint32_t region[4] = {61, 40, 104, 77};
         memcpy(part.region, region, sizeof region);
-        struct picture crop = draw(device, cloud, PATINA_FREE_SPACE_USE, 1, &part, NULL);
+        struct picture crop = draw(device, asked, PATINA_FREE_SPACE_USE, 1, &part, NULL);
         picture_assert_identical(&crop, &picture, region[0], region[1], "what was looked through, in a region");
         struct picture unasked = draw(device, plain, PATINA_FREE_SPACE_USE, 1, &settings, NULL);
         struct picture off = draw(device, plain, PATINA_FREE_SPACE_OFF, 1, &settings, NULL);
         picture_assert_identical(&unasked, &off, 0, 0, "a cloud whose stations are not known");
         settings.layer_passes = 7; // of several layers nothing is taken back: behind what is empty none is looked for
-        struct picture layers = draw(device, cloud, PATINA_FREE_SPACE_USE, 1, &settings, NULL);
+        struct picture layers = draw(device, asked, PATINA_FREE_SPACE_USE, 1, &settings, NULL);
         settings.layer_passes = 0;
         assert_true(look(&layers, 1).empty == 0);
         picture_free(&layers);
@@ -231,18 +251,13 @@ static void test_alike(void **state)
     picture_free(&first);
     patina_cloud_destroy(opened);
     patina_cloud_destroy(plain);
-    patina_cloud_destroy(cloud);
     unlink(path);
-    free(scan.position);
-    free(scan.station);
 }
 
 // What is shown of free space comes behind shading; depth of field then may not be drawn over what the others still read.
 static void test_shown_out_of_focus(void **state)
 {
     (void)state;
-    struct scan scan = make_scan();
-    patina_cloud *cloud = make_cloud(&scan, 1);
     patina_settings settings = settings_of();
     settings.antialias = PATINA_ANTIALIAS_LAYERS;
     const patina_effects effects = {.struct_size = sizeof effects,
@@ -253,7 +268,7 @@ static void test_shown_out_of_focus(void **state)
                                     .focus_aperture = 0.05f};
     const patina_cloud_style style = {
         .struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .free_space = PATINA_FREE_SPACE_SHOW};
-    patina_scene *scene = scene_of(cloud, &style);
+    patina_scene *scene = scene_of(asked, &style);
     CHECK(patina_scene_set_effects(scene, &effects), scene);
     const patina_camera camera = camera_at(0);
     CHECK(patina_scene_set_camera(scene, &camera), scene);
@@ -277,9 +292,6 @@ static void test_shown_out_of_focus(void **state)
     }
     picture_free(&first);
     patina_scene_destroy(scene);
-    patina_cloud_destroy(cloud);
-    free(scan.position);
-    free(scan.station);
 }
 
 int main(int argc, char **argv)
@@ -287,5 +299,5 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_slit), cmocka_unit_test(test_alike),
                                        cmocka_unit_test(test_shown_out_of_focus)};
     support_arguments(argc, argv);
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, make_asked, free_asked);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tasks: the work of a call on a thread of its own, with its code and message; waiting, cancelling, letting go meanwhile.
-#include <patina/patina.h>
+#include "scene/analysis.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -262,7 +262,7 @@ static void test_files(void **state)
 static void test_analyses_files(void **state)
 {
     (void)state;
-    enum { LITTLE = 16 << 20 };
+    enum { LITTLE = 16 << 20, JUST_TOO_MANY = 310000, FEW = 4 };
 #ifdef _WIN32
     char folder[] = "patina-task-files";
 #else
@@ -276,17 +276,20 @@ static void test_analyses_files(void **state)
     snprintf(to, sizeof to, "%s/found", folder);
     snprintf(wanted, sizeof wanted, "%s/wanted", folder);
     snprintf(none, sizeof none, "%s/none", folder);
-    const patina_cloud_desc desc = describe(POINTS);
+    const patina_cloud_desc desc = describe(JUST_TOO_MANY);
     patina_cloud *cloud = NULL;
     patina_task *task = NULL;
     patina_progress *progress = NULL;
-    for (int i = 0; i < POINTS; i++)
+    for (int i = 0; i < JUST_TOO_MANY; i++)
         station[i] = points[i][2] < 0.5f;
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
     assert_int_equal(patina_cloud_save(cloud, from), PATINA_OK);
     patina_cloud_destroy(cloud);
+    assert_int_equal(patina_cloud_open(from, &cloud), PATINA_OK);
+    assert_true(pt_cloud_mapped_bytes(cloud) + pt_analysis_memory(cloud) > LITTLE);
+    patina_cloud_destroy(cloud);
     for (int told = 0; told < 2; told++) {
-        patina_analysis_desc analysis = {.struct_size = sizeof analysis};
+        patina_analysis_desc analysis = {.struct_size = sizeof analysis, .neighbours = FEW};
         if (told) {
             analysis.station_count = 2;
             analysis.stations = &stations[0][0];
