@@ -170,6 +170,19 @@ struct ref_disc *discs_reference(struct harness *h, const struct disc_scene *sce
     return discs;
 }
 
+void discs_around(struct harness *h, struct around *around, const struct view_args *view, const struct ref_disc *discs,
+                  uint32_t count, int x, int y)
+{
+    enum { WIDE = 16 };
+    if (around->strip == x / WIDE && around->y == y)
+        return;
+    if (!around->places)
+        around->places = harness_alloc(h, (count + 1) * sizeof *around->places);
+    around->strip = x / WIDE;
+    around->y = y;
+    around->count = ref_discs_around(view, discs, count, around->strip * WIDE, around->strip * WIDE + WIDE, y, around->places);
+}
+
 const struct ref_disc *discs_find(const struct ref_disc *discs, uint32_t count, uint32_t id)
 {
     const struct ref_disc wanted = {.id = id};

@@ -32,6 +32,14 @@ void discs_beside(struct harness *h, struct rng *rng, struct disc_scene *scene, 
 struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene);
 // Every point of the scene, by rising id; count is the number of points.
 struct ref_disc *discs_reference(struct harness *h, const struct disc_scene *scene, uint32_t *count);
+// Of the reference's discs those near a pixel, by their places in the list: of a strip of pixels, while those that are asked for lie in
+// it. Begin with {.strip = -1}.
+struct around {
+    int strip, y;
+    uint32_t count, *places;
+};
+void discs_around(struct harness *h, struct around *around, const struct view_args *view, const struct ref_disc *discs,
+                  uint32_t count, int x, int y);
 const struct ref_disc *discs_find(const struct ref_disc *discs, uint32_t count, uint32_t id); // NULL: none
 
 #endif

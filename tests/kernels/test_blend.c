@@ -124,10 +124,13 @@ static size_t check_marks(struct harness *h, const struct scenery *s)
     const void *kept = harness_kept(h);
     if (kept)
         memcpy(counts, kept, s->count + 1);
+    struct around around = {.strip = -1};
     for (size_t p = 0; p < (size_t)points->view.width * points->view.height && !kept; p++) {
         const struct ref_disc *nearest = nearest_of(s, p);
         const int x = (int)(p % points->view.width), y = (int)(p / points->view.width);
-        for (uint32_t k = 0; k < s->count && nearest; k++) {
+        discs_around(h, &around, &points->view, s->discs, s->count, x, y);
+        for (uint32_t i = 0; i < around.count && nearest; i++) {
+            const uint32_t k = around.places[i];
             const struct ref_met cover = ref_disc_at(&points->view, &s->discs[k], x, y);
             counts[k] |= ref_blend_takes(&s->discs[k], &cover, nearest == &s->discs[k], ref_key_z(s->planes->keys[p]),
                                          (double)s->planes->deff[p]) == REF_YES;
@@ -193,14 +196,17 @@ static void check_light(struct harness *h, const struct scenery *s)
     for (uint32_t d = 0; d < s->count; d++)
         looks[d] = light_of(s, words, lights, s->discs[d].id);
     size_t unsure = 0, shown = 0;
+    struct around around = {.strip = -1};
     for (size_t p = 0; p < pixels; p += EVERY) {
         const struct ref_disc *nearest = nearest_of(s, p);
         const int x = (int)(p % points->view.width), y = (int)(p / points->view.width);
         const float n[3] = {0.0f, 0.0f, 1.0f};
         if (!nearest)
             continue;
-        const struct ref_blend expected = ref_blend(&points->view, s->discs, looks, s->count, (uint32_t)(nearest - s->discs),
-                                                    (float)ref_key_z(s->planes->keys[p]), s->planes->deff[p], n, x, y);
+        discs_around(h, &around, &points->view, s->discs, s->count, x, y);
+        const struct ref_blend expected = ref_blend(&points->view, s->discs, looks, around.places, around.count,
+                                                    (uint32_t)(nearest - s->discs), (float)ref_key_z(s->planes->keys[p]),
+                                                    s->planes->deff[p], n, x, y);
         shown++;
         unsure += expected.unsure != 0;
         for (uint32_t k = 0; k < 3; k++) {
@@ -281,9 +287,18 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     uint32_t count;
     const struct ref_disc *discs = discs_reference(h, scene, &count);
     struct ref_look *looks = harness_alloc(h, (count + 1) * sizeof *looks);
-    for (uint32_t i = 0; i < count; i++)
+    double least[4] = {INFINITY, INFINITY, INFINITY, INFINITY}, most[4] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY};
+    for (uint32_t i = 0; i < count; i++) {
         looks[i] = look_of(scene, paint, discs[i].id);
+        for (int k = 0; k < 4; k++) {
+            const double term = k == 3 ? looks[i].opacity
+                                       : fmax(fmin(looks[i].color[k], (double)PT_SUM_BRIGHTEST), -(double)PT_SUM_BRIGHTEST);
+            least[k] = fmin(least[k], term);
+            most[k] = fmax(most[k], term);
+        }
+    }
     size_t unsure = 0, unsure_depth = 0, shown = 0;
+    struct around around = {.strip = -1};
     for (size_t p = 0; p < pixels && !harness_settled(h); p++) {
         const int x = (int)(p % points->view.width), y = (int)(p / points->view.width);
         if (out.keys[p] == REF_EMPTY_KEY)
@@ -292,22 +307,17 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
         HARNESS_CHECK(h, nearest != NULL);
         if (!nearest)
             continue;
-        const struct ref_blend expected = ref_blend(&points->view, discs, looks, count, (uint32_t)(nearest - discs),
-                                                    (float)ref_key_z(out.keys[p]), out.deff[p], before + 4 * p, x, y);
+        discs_around(h, &around, &points->view, discs, count, x, y);
+        const struct ref_blend expected = ref_blend(&points->view, discs, looks, around.places, around.count,
+                                                    (uint32_t)(nearest - discs), (float)ref_key_z(out.keys[p]), out.deff[p],
+                                                    before + 4 * p, x, y);
         shown++;
         // whatever float32 cannot decide, a mean lies between what is blended
         for (int k = 0; k < 4; k++) {
-            double least = INFINITY, most = -INFINITY;
-            for (uint32_t i = 0; i < count; i++) {
-                const double term = k == 3 ? looks[i].opacity
-                                           : fmax(fmin(looks[i].color[k], (double)PT_SUM_BRIGHTEST), -(double)PT_SUM_BRIGHTEST);
-                least = fmin(least, term);
-                most = fmax(most, term);
-            }
-            const double got = out.albedo[4 * p + (size_t)k], slack = 1e-3 + 1e-3 * (fabs(least) + fabs(most));
-            if (!(got >= fmin(least, 0.0) - slack && got <= fmax(most, 0.0) + slack))
-                harness_fail(h, "albedo", x, y, "channel %d: got %.9g, all there is lies from %.9g to %.9g", k, got, least,
-                             most);
+            const double got = out.albedo[4 * p + (size_t)k], slack = 1e-3 + 1e-3 * (fabs(least[k]) + fabs(most[k]));
+            if (!(got >= fmin(least[k], 0.0) - slack && got <= fmax(most[k], 0.0) + slack))
+                harness_fail(h, "albedo", x, y, "channel %d: got %.9g, all there is lies from %.9g to %.9g", k, got, least[k],
+                             most[k]);
         }
         const float *mean = out.normal + 4 * p;
         if (!(sqrt((double)mean[0] * mean[0] + (double)mean[1] * mean[1] + (double)mean[2] * mean[2]) < 1.0 + 1e-5))
@@ -523,11 +533,12 @@ static void sanity(struct harness *h)
     discs[1].place.x = (struct ref_range){53.5, 53.5}; // half a radius off
     const struct ref_look looks[2] = {{{1.0, 0.0, 0.0}, 1.0}, {{0.0, 1.0, 0.0}, 1.0}};
     const float n[3] = {0.0f, 0.0f, 1.0f};
-    const struct ref_blend both = ref_blend(&view, discs, looks, 2, 0, 2.0f, 0.5f, n, 32, 32);
+    const uint32_t around[2] = {0, 1};
+    const struct ref_blend both = ref_blend(&view, discs, looks, around, 2, 0, 2.0f, 0.5f, n, 32, 32);
     HARNESS_CHECK(h, !both.unsure && harness_near(both.color[0], 1.0 / (1.0 + exp(-0.5)), 1e-3));
     HARNESS_CHECK(h, both.away == 0.0 && both.color[3] == 1.0 && both.n.z > 0.999);
     discs[1].place.z = (struct ref_range){3.0, 3.0};
-    HARNESS_CHECK(h, ref_blend(&view, discs, looks, 2, 0, 2.0f, 0.5f, n, 32, 32).color[0] == 1.0);
+    HARNESS_CHECK(h, ref_blend(&view, discs, looks, around, 2, 0, 2.0f, 0.5f, n, 32, 32).color[0] == 1.0);
 }
 
 int main(int argc, char **argv)

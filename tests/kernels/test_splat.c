@@ -20,11 +20,14 @@ static uint64_t *check_scene(struct harness *h, struct disc_scene *scene)
     uint32_t count;
     const struct ref_disc *discs = discs_reference(h, scene, &count);
     size_t covered = 0;
+    struct around around = {.strip = -1};
     for (size_t p = 0; p < pixels; p++) {
         const int x = (int)(p % width), y = (int)(p / width);
         const double z = ref_key_z(keys[p]);
         double farthest = INFINITY;
-        for (uint32_t i = 0; i < count; i++) {
+        discs_around(h, &around, view, discs, count, x, y);
+        for (uint32_t k = 0; k < around.count; k++) {
+            const uint32_t i = around.places[k];
             if (!discs[i].definite)
                 continue;
             const struct ref_met cover = ref_disc_at(view, &discs[i], x, y);

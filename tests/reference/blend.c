@@ -38,13 +38,14 @@ enum ref_truth ref_blend_takes(const struct ref_disc *disc, const struct ref_met
 }
 
 // The mean of how far the discs within PT_DISC_DEPTHS d_eff lie behind z.
-static void mean_depth(const struct view_args *view, const struct ref_disc *discs, uint32_t count, uint32_t nearest, double z,
-                       double deff, int x, int y, struct ref_blend *out)
+static void mean_depth(const struct view_args *view, const struct ref_disc *discs, const uint32_t *around, uint32_t count,
+                       uint32_t nearest, double z, double deff, int x, int y, struct ref_blend *out)
 {
     const double reach = fmax(fmin((double)PT_DISC_DEPTHS * deff, (double)PT_DISC_MOST), (double)PT_DISC_LEAST);
     const double farthest = z + reach, slack = 2.0 * TOL_UNIT * farthest;
     double weights = 0.0, weights_error = 0.0, sum = 0.0, sum_error = 0.0;
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t j = 0; j < count; j++) {
+        const uint32_t i = around[j];
         const struct ref_met cover = ref_disc_at(view, &discs[i], x, y);
         double error;
         if (!discs[i].possible || cover.covered == REF_NO || (i != nearest && cover.z.lo > farthest + slack))
@@ -65,13 +66,15 @@ static void mean_depth(const struct view_args *view, const struct ref_disc *disc
 }
 
 struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *discs, const struct ref_look *looks,
-                           uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int x, int y)
+                           const uint32_t *around, uint32_t count, uint32_t nearest, float z, float deff, const float n[3],
+                           int x, int y)
 {
     struct ref_blend out = {.color_error = {0}};
     double weights = 0.0, weights_error = 0.0, opaque = 0.0, opaque_error = 0.0, color[3] = {0}, color_error[3] = {0};
     double terms = 0.0, normal_error = 0.0;
     struct ref_vec normal = {0, 0, 0};
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t j = 0; j < count; j++) {
+        const uint32_t i = around[j];
         const struct ref_met cover = ref_disc_at(view, &discs[i], x, y);
         const enum ref_truth taken = ref_blend_takes(&discs[i], &cover, i == nearest, (double)z, (double)deff);
         double error, w;
@@ -103,7 +106,7 @@ struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *
     }
     out.color[3] = opaque / weights;
     out.color_error[3] = (opaque_error + out.color[3] * weights_error) / fmax(weights - weights_error, 1e-12) + 1e-6;
-    mean_depth(view, discs, count, nearest, z, deff, x, y, &out);
+    mean_depth(view, discs, around, count, nearest, z, deff, x, y, &out);
     // on the side of the nearest disc's
     struct ref_ray at = ref_ray(view, x, y);
     double facing = view->perspective ? n[0] * at.u + n[1] * at.v - n[2] : -(double)n[2];

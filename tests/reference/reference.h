@@ -152,6 +152,10 @@ struct ref_met {
     struct ref_range z, square;
 };
 struct ref_met ref_disc_at(const struct view_args *view, const struct ref_disc *disc, int x, int y);
+// Of which discs that may say anything but "not covered" for one of the pixels x0 to x1 - 1 of the row y: their places in the list,
+// rising. Returns how many; around: room for all.
+uint32_t ref_discs_around(const struct view_args *view, const struct ref_disc *discs, uint32_t count, int x0, int x1, int y,
+                          uint32_t *around);
 
 struct ref_look { // what blend reads of a point
     double color[3], opacity;
@@ -166,9 +170,10 @@ struct ref_blend {
 };
 // Whether a disc that covers a pixel so counts there. z: of the key; nearest: it is the key's.
 enum ref_truth ref_blend_takes(const struct ref_disc *disc, const struct ref_met *cover, int nearest, double z, double deff);
-// nearest: the key's disc, by its place in the list; z, deff: of the pixel; n: its normal before, w aside.
+// around: the discs that may be there, by their places in the list; nearest: the key's; z, deff: of the pixel; n: its normal before, w aside.
 struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *discs, const struct ref_look *looks,
-                           uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int x, int y);
+                           const uint32_t *around, uint32_t count, uint32_t nearest, float z, float deff, const float n[3],
+                           int x, int y);
 
 // ---- one pixel of a filter --------------------------------------------------------------------------------------------
 

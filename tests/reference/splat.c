@@ -185,6 +185,32 @@ static int is_far(const struct view_args *view, const struct ref_disc *disc, int
     return !view->level && z > 0.0 && du * du + dv * dv > reach * reach * ref_dot(ray, ray);
 }
 
+// Whether all rays through these pixels do, and the point lies in none of them.
+static int is_far_of_all(const struct view_args *view, const struct ref_disc *disc, int x0, int x1, int y)
+{
+    const double ends[2] = {view->origin_x + x0 + 0.5, view->origin_x + x1 - 0.5}, beside_y = view->origin_y + y + 0.5;
+    const double z = middle(disc->place.z), scale = view->perspective ? z : 1.0, px = middle(disc->place.x);
+    const double du = scale * view->ray_xs * fmax(fmax(ends[0] - px, px - ends[1]), 0.0),
+                 dv = scale * view->ray_ys * (beside_y - middle(disc->place.y));
+    const struct ref_vec first = ray_of(view, ends[0], beside_y), last = ray_of(view, ends[1], beside_y);
+    const double reach = 1.01 * disc->radius + 1e-4 * z, longest = fmax(ref_dot(first, first), ref_dot(last, last));
+    const double row = y + (double)view->origin_y;
+    const int beside = floor(disc->place.x.hi) < x0 + (double)view->origin_x ||
+                       floor(disc->place.x.lo) > x1 - 1 + (double)view->origin_x || floor(disc->place.y.hi) < row ||
+                       floor(disc->place.y.lo) > row;
+    return beside && !view->level && z > 0.0 && du * du + dv * dv > (1.0 + 1e-9) * reach * reach * longest;
+}
+
+uint32_t ref_discs_around(const struct view_args *view, const struct ref_disc *discs, uint32_t count, int x0, int x1, int y,
+                          uint32_t *around)
+{
+    uint32_t found = 0;
+    for (uint32_t i = 0; i < count; i++)
+        if (!is_far_of_all(view, &discs[i], x0, x1, y))
+            around[found++] = i;
+    return found;
+}
+
 struct ref_met ref_disc_at(const struct view_args *view, const struct ref_disc *disc, int x, int y)
 {
     const enum ref_truth own = falls_into(view, disc, x, y);
