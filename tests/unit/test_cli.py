@@ -52,12 +52,18 @@ def read_png(path):
     raw, stride, rows, above = zlib.decompress(packed), width * channels, [], bytes(width * channels)
     for y in range(height):
         kind, row = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
-        for x in range(stride):
-            a = row[x - channels] if x >= channels else 0
-            b, c = above[x], above[x - channels] if x >= channels else 0
-            p = a + b - c
-            nearest = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
-            row[x] = (row[x] + (0, a, b, (a + b) // 2, nearest)[kind]) & 255
+        if kind == 1:
+            for x in range(channels, stride):
+                row[x] = (row[x] + row[x - channels]) & 255
+        elif kind == 2:
+            row = bytearray((value + b) & 255 for value, b in zip(row, above, strict=True))
+        elif kind:
+            for x in range(stride):
+                a = row[x - channels] if x >= channels else 0
+                b, c = above[x], above[x - channels] if x >= channels else 0
+                p = a + b - c
+                nearest = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+                row[x] = (row[x] + ((a + b) // 2 if kind == 3 else nearest)) & 255
         rows.append([tuple(row[x:x + channels]) for x in range(0, stride, channels)])
         above = row
     return width, height, channels, rows
@@ -281,7 +287,8 @@ def test_soft():
     style = ["--soft-opacity", "0.1", "--soft-radius", "0.03"]
 
     def at(*arguments):
-        run("render", "soft.csv", "green.ply", *view, *arguments)
+        analysis = "on" if any("density" in word or "uncertainty" in word for word in arguments) else "off"
+        run("render", "soft.csv", "green.ply", *view, "--analysis", analysis, *arguments)
         rows = read_png("soft.png")[3]
         return [rows[32][x] for x in (16, 48)]
 
@@ -654,7 +661,7 @@ def test_colors_and_clips():
     rows = ["x,y,z,classification,rise"]
     rows += [f"{x * step - 1},0,{z * step - 1},{2 if x < 60 else 6},{10 * z}" for x in range(120) for z in range(120)]
     (FOLDER / "wall.csv").write_text("\n".join(rows))
-    view = ["--size", "64x64", "--look", "0,-3,0,0,0,0", "--unlit", "--background", "0,0,0", "-o", "c.png"]
+    view = ["--size", "64x64", "--look", "0,-3,0,0,0,0", "--unlit", "--background", "0,0,0", "--analysis", "off", "-o", "c.png"]
     left, right = (16, 32), (48, 32)
 
     def at(*arguments):
