@@ -5,7 +5,7 @@
     python tests/blender/test_addon.py [NAME ...]
 
 The library is the one that PATINA_LIBRARY names. NAMEs run only the tests whose names contain one of them; --some leaves out what no
-version of Blender changes (ONCE), where others run all.
+version of Blender changes (ONCE), where others run all; --quick, before each commit, what takes long (SLOW).
 """
 
 import importlib
@@ -29,6 +29,17 @@ MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "chec
 # Of files, servers and processes beside Blender, or of pictures that the library alone decides: how the names begin.
 ONCE = ("analysis/once", "building/", "copc/", "ept/", "formats/", "kept/", "linked/opens_from_its_cache", "pages/", "samples/panoramas_sample_by_sample",
         "styles/shipped_files_say", "styles/thumbnails_are_of_today", "textures/points_shadow_triangles")
+# What takes seconds of a processor, by its whole name: Blenders beside this one, Cycles, many pictures, large files. Each module keeps a test
+# that is quicker.
+SLOW = ("analysis/beside", "analysis/cancel", "analysis/final_takes_over", "analysis/once",
+        "building/cancelled_and_cut", "building/killed", "building/no_room_to_analyze", "building/same_files", "building/same_ply",
+        "building/two_at_once", "effects/contour", "farm/farm_draws_frames", "farm/farm_draws_tiles", "kept/damage_is_found",
+        "linked/opens_from_its_cache", "losses/farm_learns_of_it", "preferences/readers_by_pip", "preferences/real_readers_from_files",
+        "roles/beside_cycles", "roles/shadow_catcher", "samples/panoramas_sample_by_sample", "styles/save_and_load",
+        "styles/shipped_files_say_just_what_differs", "styles/thumbnails_are_of_today", "textures/opacity",
+        "textures/points_shadow_triangles", "world/baked_skies_like_cycles", "world/light_like_cycles", "world/nodes_like_cycles")
+CHOICES = {"--some": (lambda label: label.startswith(ONCE), "no version of Blender changes them; Debian's runs them, and the newest that has readers"),
+           "--quick": (lambda label: label in SLOW, "they take long, and build/test runs them")}
 
 
 def wanted_names():
@@ -38,21 +49,41 @@ def wanted_names():
     return arguments[1:] if Path(arguments[0]).name == Path(__file__).name else []
 
 
+def wrong_lists(labels):
+    """What ONCE and SLOW say that is not so; labels: of all tests."""
+    wrong = [f"{name} is no test" for name in (*SLOW, *ONCE) if not any(label.startswith(name) for label in labels)]
+    quick = {label.split("/")[0] for label in labels if label not in SLOW}
+    return wrong + [f"all tests of {module} are slow" for module in sorted({label.split("/")[0] for label in labels} - quick)]
+
+
+def work():
+    """Processor seconds of this process, and of those that it waited for."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
 def main():
     import harness
     names = wanted_names()
-    some = "--some" in names
-    names = [name for name in names if name != "--some"]
+    left_out = {name: [] for name in names if name in CHOICES}
+    names = [name for name in names if name not in CHOICES]
     passed = failed = skipped = 0
+    labels, took = [], []
     for module in map(importlib.import_module, MODULES):
         for name, test in list(vars(module).items()):
-            if not name.startswith("test_") or names and not any(part in name for part in names):
+            if not name.startswith("test_"):
                 continue
             label = f"{module.__name__[len('check_'):]}/{name[len('test_'):]}"
-            start = time.perf_counter()
+            labels.append(label)
+            if names and not any(part in name for part in names):
+                continue
+            choice = next((choice for choice in left_out if CHOICES[choice][0](label)), None)
+            if choice:
+                skipped += 1
+                left_out[choice].append(label)
+                continue
+            start, before = time.perf_counter(), work()
             try:
-                if some and label.startswith(ONCE):
-                    raise harness.Skip("no version of Blender changes it; Debian's runs it, and the newest that has readers")
                 test()
             except harness.Skip as reason:
                 skipped += 1
@@ -64,8 +95,16 @@ def main():
                 print(f"FAIL {label}: {text} ({Path(where.filename).name}:{where.lineno})", flush=True)
             else:
                 passed += 1
+                took.append((work() - before, label))
                 print(f"ok {label} ({time.perf_counter() - start:.2f} s)", flush=True)
+    for wrong in wrong_lists(labels):
+        failed += 1
+        print(f"FAIL lists of test_addon.py: {wrong}", flush=True)
+    for choice, those in left_out.items():
+        if those:
+            print(f"skip {choice}: {CHOICES[choice][1]}: {', '.join(those)}", flush=True)
     harness.patina.unregister()
+    print("seconds of a processor:", ", ".join(f"{label} {seconds:.1f}" for seconds, label in sorted(took, reverse=True)[:10]), flush=True)
     print(f"{passed} passed, {failed} failed, {skipped} skipped", flush=True)
     return 1 if failed or not passed else 0
 
