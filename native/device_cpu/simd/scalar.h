@@ -59,7 +59,7 @@ static inline void vi_store_where(void *p, vi a, vm m)
     if (m)
         memcpy(p, &a, 4);
 }
-static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { vi_store(p, ((void)lanes, a)); } // floats too: never as a uint32_t
+static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { vi_store(p, ((void)lanes, a)); } // of floats too
 static inline vi vi_west(vi before, vi own) { return ((void)own, before); }
 static inline vi vi_east(vi own, vi behind) { return ((void)own, behind); }
 static inline vi vi_evens(vi a, vi b) { return ((void)b, a); }
