@@ -294,13 +294,15 @@ static void set_view(const struct pt_eye *camera, struct view_args *view)
 
 // ---- what kernels get ----------------------------------------------------------------------------------------------------
 
-// The pixels or cells that its points may fall into.
+// The pixels or cells that its points may fall into. What lies beside the finer cells, though not beside the coarser ones around them, has
+// none: rows begin at no end of a plane.
 static void set_place(struct chunk_view *out, const uint32_t rect[4])
 {
-    out->column_first = rect[0];
-    out->row_first = rect[1];
-    out->column_end = rect[2];
-    out->row_end = rect[3];
+    const int some = rect[0] < rect[2] && rect[1] < rect[3];
+    out->column_first = some ? rect[0] : 0;
+    out->row_first = some ? rect[1] : 0;
+    out->column_end = some ? rect[2] : 0;
+    out->row_end = some ? rect[3] : 0;
 }
 
 // A chunk of instance i, as it was placed for the coarser cells, in the finer ones.

@@ -147,11 +147,11 @@ int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arr
     if (!(good | bad))
         return 0;
     const uint32_t before = atomic_fetch_or(&cloud->page_sums->states[chunk], good | bad);
-    if (!bad || before & PT_PAGE_DAMAGED)
-        return 0;
-    atomic_fetch_add(&cloud->page_sums->damaged, 1);
-    atomic_fetch_add(&cloud->page_sums->untold, 1);
-    return 1;
+    if (bad && !(before & PT_PAGE_DAMAGED)) {
+        atomic_fetch_add(&cloud->page_sums->damaged, 1);
+        atomic_fetch_add(&cloud->page_sums->untold, 1);
+    }
+    return bad != 0; // to each that found it, though told once
 }
 
 // ---- told --------------------------------------------------------------------------------------------------------------

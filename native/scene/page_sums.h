@@ -45,7 +45,7 @@ int pt_pages_are_damaged(const struct patina_cloud *cloud);
 int pt_page_is_damaged(const struct patina_cloud *cloud, uint32_t chunk);
 // Whether these arrays (bits 1 << pt_array) of the chunk need a look yet: those that lie in the file. Any thread.
 uint32_t pt_page_unseen(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays);
-// Looks at them. 1: it is damaged, and nobody had found it before. Any thread.
+// Looks at them. 1: it is damaged, and was not known to be before this look; of several threads at once each is told. Any thread.
 int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays);
 // One line of the log on all pages that were found since it was told last; none where there are none. Any thread.
 void pt_pages_tell(const struct patina_cloud *cloud);

@@ -2,6 +2,7 @@
 // The plan without a device: which passes a scene calls for, why the others are left out, what is culled, and that a
 // region decides as the whole picture does (DESIGN rule 3, SPEC 8).
 #include "plan/passes.h"
+#include "plan/ranges.h"
 #include "scenes/support.h"
 #include "shared/filling.h"
 #include "shared/lines.h"
@@ -544,6 +545,44 @@ static void test_places_hold_points(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// Chunks of range images that lie beside the picture: in the finer cells, too, each lies within the plane, or it is not known where.
+static void test_places_in_finer_cells(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    uint32_t beside = 0, fine_chunks = 0;
+    for (int i = 0; i < 400; i++) {
+        patina_scene *scene = scene_above(NULL, 2.5, 1, 0);
+        const patina_cloud_style style = {
+            .struct_size = sizeof style, .surface = PATINA_SURFACE_RANGES, .range_pixel = 32.0f, .range_sharpness = 0.5f};
+        const double turn = 0.1 * i, at[3] = {cos(turn), sin(turn), 0.02 + 0.001 * i},
+                     to[3] = {0.4 * cos(turn), 0.4 * sin(turn), i % 3 ? 0.0 : 0.05};
+        assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
+        look(scene, at, to);
+        struct pt_plan plan = plan_of(scene);
+        for (uint32_t n = 0; n < plan.instance_count; n++) {
+            const struct pt_range *range = plan.instances[n].as.range;
+            const struct chunk_view *chunks = plan.instances[n].chunks;
+            for (uint32_t count = plan.instances[n].chunk_count; range;
+                 range = range->fine, chunks = range ? range->chunks : NULL, count = range ? range->chunk_count : 0)
+                for (uint32_t c = 0; c < count; c++) {
+                    const struct chunk_view *chunk = &chunks[c];
+                    const int known = chunk->row_end > 0;
+                    beside += !known;
+                    fine_chunks += chunks != plan.instances[n].chunks;
+                    assert_true(known ? chunk->row_first < chunk->row_end && chunk->row_end <= range->cells.height
+                                      : !chunk->row_first);
+                    assert_true(known ? chunk->column_first < chunk->column_end && chunk->column_end <= range->cells.width
+                                      : !chunk->column_first && !chunk->column_end);
+                }
+        }
+        pt_plan_destroy(&plan);
+        patina_scene_destroy(scene);
+    }
+    assert_true(fine_chunks > 100 && beside > 10);
+    patina_cloud_destroy(cloud);
+}
+
 // The ground below and behind a camera does not show: what is filled is chosen by what does, 12 to 28 pixels apart.
 static void test_spacing_is_of_what_shows(void **state)
 {
@@ -902,6 +941,7 @@ int main(void)
         cmocka_unit_test(test_bins_of_discs),
         cmocka_unit_test(test_low_parts),
         cmocka_unit_test(test_places_hold_points),
+        cmocka_unit_test(test_places_in_finer_cells),
         cmocka_unit_test(test_chunks_around_the_camera),
         cmocka_unit_test(test_spacing_is_of_what_shows),
         cmocka_unit_test(test_nothing_in_view_is_said),
