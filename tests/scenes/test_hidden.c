@@ -126,6 +126,8 @@ static void test_pictures(void **state)
 {
     static const char *const names[PICTURES] = {"filled",   "culled", "orthographic", "two instances",
                                                 "close by", "layers", "shadows",      "range images"};
+    // Hundredths of what passes would read: scatter alone leaves out what is hidden, and an orthographic picture looks past the wall's side.
+    static const uint32_t most[PICTURES] = {67, 67, 80, 67, 67, 80, 85, 90};
     static const struct {
         const char *name;
         uint32_t threads;
@@ -141,9 +143,7 @@ static void test_pictures(void **state)
             struct picture picture = draw(capped, cloud, what, &told);
             assert_int_equal(told.mapped_cap, CAP);
             picture_assert_identical(&picture, &all, 0, 0, names[what]);
-            assert_true(told.mapped_read <= fits.mapped_read);
-            if (what <= TWO) // where scatter alone reads; the last looks past the wall's side
-                assert_true(told.mapped_read < fits.mapped_read / 100 * (what == ORTHOGRAPHIC ? 80 : 67));
+            assert_true(told.mapped_read < fits.mapped_read / 100 * most[what]);
             picture_free(&picture);
             patina_device_destroy(capped);
         }
@@ -162,9 +162,10 @@ static void test_in_parts(void **state)
     patina_device *whole = open_device("cpu", 2, UINT64_MAX), *capped = open_device("cpu", 2, CAP);
     patina_cloud *cloud = open_cloud(good);
     patina_frame_stats fits;
-    struct picture all = draw(whole, cloud, FILLED, &fits);
+    struct picture all = draw(whole, cloud, TWO, &fits);
+    assert_true(fits.mapped_read / 2 > 16 << 20); // a part asks for enough that it is taken in steps
     const char *const list[] = {keys[0], keys[1]};
-    patina_scene *scene = scene_with(cloud, FILLED);
+    patina_scene *scene = scene_with(cloud, TWO);
     patina_frame *frame = NULL;
     uint32_t round = 9;
     CHECK(patina_frame_create(capped, &frame), capped);
