@@ -138,11 +138,18 @@ def _output(scene: Scene, kind: str) -> str:
     return str(place.with_name(name if kind == "frames" else name.replace("#", "")))
 
 
+def _paths_of(used: bool) -> set[Path]:
+    """Of volumes (linked clouds are some) and images, of those that something uses or of those that nothing does."""
+    return {Path(bpy.path.abspath(item.filepath, library=item.library)) for item in (*bpy.data.volumes, *bpy.data.images)
+            if bool(item.users) == used and item.filepath}
+
+
 def _files() -> dict[str, list]:
     """What of the disk the scene is made of. Refused where something is missing."""
     from ..farm import task
     found = {}
     places = {Path(bpy.path.abspath(path)) for path in bpy.utils.blend_paths(absolute=True, packed=False)}
+    places -= _paths_of(used=False) - _paths_of(used=True)  # nor what is left of objects that are gone, until Blender begins anew
     places |= {place for place in map(files.path_of, bpy.data.objects) if place is not None}
     for place in sorted(places):
         if sequence.is_pattern(place) or place.is_dir():

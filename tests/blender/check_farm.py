@@ -138,10 +138,29 @@ def test_farm_refuses():
     settings.file_format = 'PNG'
     image = bpy.data.images.new("gone", 4, 4)
     image.source, image.filepath = 'FILE', str(SCRATCH / "gone.png")
+    image.use_fake_user = True  # as if a material had it
     refused("gone.png cannot be read")
     bpy.data.images.remove(image)
     scene.camera = None
     refused("no camera")
+
+
+def test_farm_asks_for_nothing_that_is_gone():
+    """What objects that are deleted have left behind, until Blender begins anew, may miss its file."""
+    scene = scene_of_points()
+    scene.render.filepath = str(SCRATCH / "left" / "x.png")
+    gone = dense("left_behind.ply")
+    obj, = import_ply(gone, link=True)
+    gone.unlink()
+    refused("left_behind.ply cannot be read")
+    bpy.data.objects.remove(obj)
+    bpy.data.images.new("left", 4, 4).source = 'FILE'
+    bpy.data.images["left"].filepath = str(SCRATCH / "left.png")
+    check([volume.users for volume in bpy.data.volumes if "left_behind" in volume.filepath] == [0], "nothing is left behind")
+    check(bpy.ops.render.patina_farm(directory=str(SCRATCH / "left-farm")) == {'FINISHED'}, "refused")
+    files = json.loads((SCRATCH / "left-farm" / "job.json").read_text("utf-8"))["files"]
+    check([Path(name).name for name in files] == ["scene.blend"], f"{files}")
+    bpy.data.images.remove(bpy.data.images["left"])
 
 
 def test_farm_shares_built_clouds():

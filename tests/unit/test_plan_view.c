@@ -251,12 +251,9 @@ static void test_region_decides_as_the_whole(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_spacing_chooses_levels),
-        cmocka_unit_test(test_low_parts),
-        cmocka_unit_test(test_places_hold_points),
-        cmocka_unit_test(test_places_in_finer_cells),
-        cmocka_unit_test(test_chunks_around_the_camera),
-        cmocka_unit_test(test_spacing_is_of_what_shows),
+        cmocka_unit_test(test_spacing_chooses_levels),      cmocka_unit_test(test_low_parts),
+        cmocka_unit_test(test_places_hold_points),          cmocka_unit_test(test_places_in_finer_cells),
+        cmocka_unit_test(test_chunks_around_the_camera),    cmocka_unit_test(test_spacing_is_of_what_shows),
         cmocka_unit_test(test_region_decides_as_the_whole),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
