@@ -357,6 +357,18 @@ void picture_assert_identical(const struct picture *part, const struct picture *
     }
 }
 
+int support_drain_log(char *text, size_t size)
+{
+    char line[512];
+    int level, lines = 0;
+    text[0] = 0;
+    while (patina_log_next(line, sizeof line, &level)) {
+        snprintf(text + strlen(text), size - strlen(text), "%s\n", line);
+        lines++;
+    }
+    return lines;
+}
+
 patina_scene *scene_of(const patina_cloud *cloud, const patina_cloud_style *style)
 {
     patina_scene *scene = NULL;

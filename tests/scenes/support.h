@@ -32,6 +32,8 @@ const char *support_message(const void *handle); // static buffer
 void support_arguments(int argc, char **argv);
 // Was the program started with `--quick`? Then what is named is left out, and that is said.
 int support_is_quick(const char *left_out);
+// All that the library's log holds; how many lines.
+int support_drain_log(char *text, size_t size);
 uint32_t support_device_count(void);
 const char *support_device_name(uint32_t i);
 // NULL, after printing "skip NAME: reason", when the device cannot be had here.

@@ -187,19 +187,6 @@ static void test_in_parts(void **state)
 
 // ---- damaged pages -------------------------------------------------------------------------------------------------------
 
-// All that the log holds; how many lines.
-static int drain(char *text, size_t size)
-{
-    char line[512];
-    int level, lines = 0;
-    text[0] = 0;
-    while (patina_log_next(line, sizeof line, &level)) {
-        snprintf(text + strlen(text), size - strlen(text), "%s\n", line);
-        lines++;
-    }
-    return lines;
-}
-
 // Of pages that lie far behind the wall, and of one of the wall if `near`, a bit of the positions is another one. Returns how many.
 static uint32_t damage(int near)
 {
@@ -243,12 +230,12 @@ static void test_damaged(void **state)
         const uint32_t pages = damage(near);
         patina_cloud *looked_at = open_cloud(bad), *not_looked_at = open_cloud(bad);
         snprintf(wanted, sizeof wanted, " %u of %u pages are damaged", pages, sound->chunk_count);
-        drain(log, sizeof log);
+        support_drain_log(log, sizeof log);
         struct picture known = draw(whole, looked_at, FILLED, &stats);
-        assert_int_equal(drain(log, sizeof log), 1);
+        assert_int_equal(support_drain_log(log, sizeof log), 1);
         assert_non_null(strstr(log, wanted));
         struct picture hidden = draw(capped, not_looked_at, FILLED, &told);
-        assert_int_equal(drain(log, sizeof log), near); // and where one is found, it is of all
+        assert_int_equal(support_drain_log(log, sizeof log), near); // and where one is found, it is of all
         assert_true(!near || strstr(log, wanted));
         print_message("%u of %u pages damaged\n", pages, sound->chunk_count);
         assert_true(pages > sound->chunk_count / 10);

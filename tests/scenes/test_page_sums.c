@@ -72,19 +72,6 @@ static struct picture render_with(patina_device *device, const patina_cloud *clo
     return picture;
 }
 
-// All that the log holds; how many lines.
-static int drain(char *text, size_t size)
-{
-    char line[512];
-    int level, lines = 0;
-    text[0] = 0;
-    while (patina_log_next(line, sizeof line, &level)) {
-        snprintf(text + strlen(text), size - strlen(text), "%s\n", line);
-        lines++;
-    }
-    return lines;
-}
-
 static void save(uint64_t count, const char *path)
 {
     struct points points = points_torus(count, 2.0, 0.7, POINTS_ALL, 7);
@@ -179,7 +166,7 @@ static void left_out(patina_device *device, const char *name)
     unsigned char *data = bytes_of(good, &size);
     const patina_settings settings = plain_settings();
     struct picture before = render_with(device, whole, &settings);
-    drain(log, sizeof log);
+    support_drain_log(log, sizeof log);
     for (int round = 0; round < 3; round++) {
         const uint32_t count = round == 1 ? 5 : 1;
         at = positions_at(data);
@@ -187,23 +174,23 @@ static void left_out(patina_device *device, const char *name)
             at += rounded((size_t)whole->slots * 12) + rounded((size_t)whole->slots * 4);
         damage(some, count, at, round == 2 ? 4 : 12);
         patina_cloud *damaged = open_cloud(bad);
-        assert_int_equal(drain(log, sizeof log), 0); // nobody has read it
+        assert_int_equal(support_drain_log(log, sizeof log), 0); // nobody has read it
         struct picture after = render_with(device, damaged, &settings);
-        assert_int_equal(drain(log, sizeof log), 1);
+        assert_int_equal(support_drain_log(log, sizeof log), 1);
         snprintf(wanted, sizeof wanted, count > 1 ? "%s: 5 of %u pages are damaged" : "%s: page %u of", bad,
                  count > 1 ? whole->chunk_count : some[0] + 1);
         if (!strstr(log, wanted) || !strstr(log, "left out"))
             support_die("'%s' should hold '%s'", log, wanted);
         expect_without(whole, &before, &after, some, count);
         struct picture again = render_with(device, damaged, &settings); // and tells it once
-        if (drain(log, sizeof log))
+        if (support_drain_log(log, sizeof log))
             support_die("told again: %s", log);
         assert_memory_equal(again.keys, after.keys, WIDTH * HEIGHT * sizeof *after.keys);
         patina_cloud_destroy(damaged);
         picture_free(&after);
         picture_free(&again);
         assert_int_equal(patina_cloud_verify(bad, NULL), PATINA_ERROR_FORMAT);
-        drain(log, sizeof log);
+        support_drain_log(log, sizeof log);
     }
     free(data);
     picture_free(&before);
@@ -235,7 +222,7 @@ static void test_rounds(void **state)
         CHECK(patina_device_create(&desc, &device), NULL);
         patina_cloud *damaged = open_cloud(bad);
         pictures[capped] = render_with(device, damaged, &settings);
-        const int lines = drain(log, sizeof log);
+        const int lines = support_drain_log(log, sizeof log);
         assert_int_equal(lines, 1);
         patina_cloud_destroy(damaged);
         patina_device_destroy(device);
@@ -343,9 +330,9 @@ static void in_parts(patina_device *plain, const char *name)
             struct picture before = render_lit(device, whole, &settings, lit),
                            alone = render_lit(device, damaged, &settings, lit);
             assert_true(memcmp(before.keys, alone.keys, WIDTH * HEIGHT * sizeof *alone.keys) != 0);
-            drain(log, sizeof log);
+            support_drain_log(log, sizeof log);
             struct picture parts = draw_in_parts(device, &settings, lit, bad, bad, bad);
-            const int lines = drain(log, sizeof log);
+            const int lines = support_drain_log(log, sizeof log);
             assert_true(lines >= 1 && lines <= PARTS + 1); // each machine tells its own
             assert_memory_equal(parts.keys, alone.keys, WIDTH * HEIGHT * sizeof *parts.keys);
             assert_memory_equal(parts.combined, alone.combined, 4 * WIDTH * HEIGHT * sizeof *parts.combined);
@@ -356,7 +343,7 @@ static void in_parts(patina_device *plain, const char *name)
             assert_memory_equal(mixed.keys, before.keys, WIDTH * HEIGHT * sizeof *mixed.keys); // as who read them has them
             for (size_t i = 0; i < 4u * WIDTH * HEIGHT; i++)
                 assert_true(isfinite(mixed.combined[i]));
-            drain(log, sizeof log);
+            support_drain_log(log, sizeof log);
             picture_free(&before);
             picture_free(&alone);
             picture_free(&parts);
@@ -404,7 +391,7 @@ static void cancelled(patina_device *device, const char *name)
         assert_true(nobody_looked(cloud));
     }
     CHECK(patina_frame_render(frame, scene), frame);
-    assert_true(drain(log, sizeof log) >= 1);
+    assert_true(support_drain_log(log, sizeof log) >= 1);
     patina_frame_destroy(frame);
     patina_scene_destroy(scene);
     patina_cloud_destroy(cloud);
@@ -480,12 +467,12 @@ static void test_below_cap(void **state)
         patina_device *device = open_capped("cpu", CAP_OF_MANY);
         patina_cloud *cloud = open_cloud(other);
         patina_scene *scene = scene_with(cloud, &settings, 0);
-        drain(log, sizeof log);
+        support_drain_log(log, sizeof log);
         const uint64_t held = held_after(device, scene, damaged ? PT_KERNEL_scatter : PT_KERNEL_splat,
                                          damaged ? PT_AGAIN : PATINA_OK);
         print_message("%.2f MB held, with a cap of %.2f\n", 1e-6 * (double)held, 1e-6 * CAP_OF_MANY);
         assert_true(held <= CAP_OF_MANY + BESIDE);
-        assert_int_equal(drain(log, sizeof log), damaged);
+        assert_int_equal(support_drain_log(log, sizeof log), damaged);
         patina_scene_destroy(scene);
         patina_cloud_destroy(cloud);
         patina_device_destroy(device);
@@ -512,13 +499,13 @@ static void test_not_written(void **state)
                  count > 1 ? "%s: 2 of %u pages are damaged, the first is page 4" : "%s: page 4 of %u is damaged", bad,
                  cloud->chunk_count);
         remove(other);
-        drain(log, sizeof log);
+        support_drain_log(log, sizeof log);
         assert_int_equal(patina_cloud_save(cloud, other), PATINA_ERROR_FORMAT);
         assert_non_null(strstr(support_message(cloud), wanted));
         assert_int_equal(patina_cloud_save(cloud, bad), PATINA_ERROR_FORMAT); // onto itself
-        assert_int_equal(drain(log, sizeof log), 2);
+        assert_int_equal(support_drain_log(log, sizeof log), 2);
         struct picture picture = render_with(device, cloud, &settings);
-        assert_int_equal(drain(log, sizeof log), 1);
+        assert_int_equal(support_drain_log(log, sizeof log), 1);
         assert_non_null(strstr(log, "left out"));
         picture_free(&picture);
         patina_cloud_destroy(cloud);
@@ -558,7 +545,7 @@ static void test_verified(void **state)
         if (i < 2)
             assert_non_null(strstr(support_message(NULL), "check sums of its pages"));
     }
-    drain(log, sizeof log);
+    support_drain_log(log, sizeof log);
     free(data);
 }
 
