@@ -237,10 +237,15 @@ static void order_chunks(const struct scatter *scatter, uint32_t chunks)
         first++;
     while (last > first && !next[last + 1])
         last--;
+    if (last - first < DEEP) {
+        for (uint32_t c = 0; c < chunks; c++)
+            scatter->by_depth[c] = c;
+        return;
+    }
     for (uint32_t depth = 0; depth < PT_DEPTHS; depth++)
-        next[depth + 1] = last - first < DEEP ? 0 : next[depth + 1] + next[depth];
+        next[depth + 1] += next[depth];
     for (uint32_t c = 0, instance = 0; c < chunks; c++)
-        scatter->by_depth[last - first < DEEP ? c : next[pt_depth_step(chunk_at(scatter, c, &instance))]++] = c;
+        scatter->by_depth[next[pt_depth_step(chunk_at(scatter, c, &instance))]++] = c;
 }
 
 static void sort_chunks(struct scatter *scatter, uint32_t chunks, uint32_t stripes)
