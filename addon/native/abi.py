@@ -416,6 +416,7 @@ CALLS = {
     "patina_task_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p, POINTER(c_void_p)),
     "patina_task_open_file": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_task_save": (c_void_p, c_char_p, POINTER(c_void_p)),
+    "patina_task_add_to_build": (c_void_p, POINTER(CloudDesc), POINTER(c_void_p)),
     "patina_task_end_build": (c_void_p, c_void_p, POINTER(c_void_p)),
     "patina_task_analyse_file": (c_char_p, POINTER(AnalysisDesc), c_uint64, c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_task_verify": (c_char_p, c_void_p, POINTER(c_void_p)),

@@ -100,6 +100,8 @@ static int save(struct patina_task *task) { return patina_cloud_save(task->saved
 
 static int end_build(struct patina_task *task) { return patina_builder_end(task->builder, task->progress); }
 
+static int add_to_build(struct patina_task *task) { return patina_builder_add(task->builder, &task->desc); }
+
 static int verify(struct patina_task *task) { return patina_cloud_verify(task->path, task->progress); }
 
 static int analyse(struct patina_task *task)
@@ -221,6 +223,15 @@ int patina_task_open_file(const char *path, patina_progress *progress, patina_ta
 int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out)
 {
     return start_at(&(struct patina_task){.work = save, .saved = cloud}, path, out);
+}
+
+int patina_task_add_to_build(patina_builder *builder, const patina_cloud_desc *desc, patina_task **out)
+{
+    struct patina_task task = {.work = add_to_build, .builder = builder};
+    if (!builder || !desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_add_to_build: builder or desc is NULL");
+    const int error = pt_take(NULL, "patina_task_add_to_build", desc, &task.desc, sizeof task.desc);
+    return error ? error : start(&task, out);
 }
 
 int patina_task_end_build(patina_builder *builder, patina_progress *progress, patina_task **out)

@@ -17,7 +17,7 @@ enum {
     BLOCK_LEAST = 1 << 12,
     BLOCK_MOST = 1 << 18
 };
-enum { COLOR = 2 }; // the field
+enum { COLOR = 2, OPACITY = 3 }; // fields
 enum { ALL_FIELDS = (1 << PT_BUILDER_FIELDS) - 1 };
 enum { ABOVE_BYTE = 1, LOW_BYTE = 2, UNLIKE = 4 };
 
@@ -99,6 +99,8 @@ int patina_builder_begin(const char *path, const patina_builder_desc *given, pat
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
     pt_handle_init(&builder->handle);
     builder->desc = desc;
+    for (uint32_t level = 0; level < PT_BUILDER_LEVELS; level++)
+        builder->level_first[level] = (uint16_t)pt_builder_level_first(level);
     builder->path = malloc(strlen(path) + 1);
     builder->pool = pt_pool_create(desc.threads, 0);
     builder->targets = malloc(BATCH * sizeof *builder->targets);
@@ -172,6 +174,7 @@ static int take_shape(struct patina_builder *builder, const patina_cloud_desc *p
         builder->offset[i] = builder->record;
         builder->size[i] = array->data ? fields[i].components * (uint32_t)pt_type_size(array->type) : 0;
         builder->record += builder->size[i];
+        builder->nonzero |= builder->size[i] ? 0 : 1u << i; // is not looked for
     }
     builder->number = builder->record;
     builder->record += sizeof(uint32_t);
@@ -220,13 +223,17 @@ struct batch {
     atomic_ullong invalid;
 };
 
-static void look_at_color(struct patina_builder *builder, const char *color, unsigned *seen)
+// A field's bytes: those of most files as a few words.
+static inline void copy_field(char *to, const char *from, uint32_t size)
 {
-    uint16_t rgb[3];
-    memcpy(rgb, color, sizeof rgb);
-    for (int k = 0; k < 3; k++)
-        *seen |= (rgb[k] > 255 ? ABOVE_BYTE : 0) | (rgb[k] & 255 ? LOW_BYTE : 0) | (rgb[k] >> 8 != (rgb[k] & 255) ? UNLIKE : 0);
-    (void)builder;
+    switch (size) {
+    case 1: *to = *from; break;
+    case 2: memcpy(to, from, 2); break;
+    case 4: memcpy(to, from, 4); break;
+    case 6: memcpy(to, from, 6); break;
+    case 12: memcpy(to, from, 12); break;
+    default: memcpy(to, from, size);
+    }
 }
 
 // Of the fields whose bits are unset, those of which the record has a byte that is not zero.
@@ -238,38 +245,19 @@ static unsigned look_for_values(const struct patina_builder *builder, const char
     return nonzero;
 }
 
-static void assemble(void *context, uint32_t begin, uint32_t end, uint32_t thread)
-{
-    struct batch *batch = context;
-    struct patina_builder *builder = batch->builder;
-    unsigned seen = 0, nonzero = atomic_load(&builder->nonzero);
-    uint64_t invalid = 0;
-    (void)thread;
-    for (uint32_t i = begin * SHARE; i < end * SHARE && i < batch->count; i++) {
-        char *record = batch->records + (size_t)i * builder->record;
-        const uint64_t from = batch->first + i;
-        double *p = builder->places[i];
-        pt_cloud_position(batch->piece, from, p);
-        invalid += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);
-        builder->targets[i] = pt_cloud_draws(batch->piece, from, p) ? 0 : NOWHERE;
-        for (int k = 0; k < PT_BUILDER_FIELDS; k++)
-            if (builder->size[k])
-                memcpy(record + builder->offset[k],
-                       (const char *)array_of(batch->piece, k)->data + from * array_of(batch->piece, k)->stride,
-                       builder->size[k]);
-        const uint32_t number = (uint32_t)(builder->count + i);
-        memcpy(record + builder->number, &number, sizeof number);
-        if (builder->desc.narrow_colors && builder->size[COLOR] == 6)
-            look_at_color(builder, record + builder->offset[COLOR], &seen);
-        if (nonzero != ALL_FIELDS)
-            nonzero = look_for_values(builder, record, nonzero);
-    }
-    atomic_fetch_or(&builder->nonzero, nonzero);
-    atomic_fetch_or(&builder->wide_colors, seen);
-    atomic_fetch_add(&batch->invalid, invalid);
-}
+struct seen { // bits of 16-bit colours
+    unsigned all, unlike;
+};
 
-// ---- places ------------------------------------------------------------------------------------------------------------
+static inline void look_at_color(const char *color, struct seen *seen)
+{
+    uint16_t rgb[3];
+    memcpy(rgb, color, sizeof rgb);
+    for (int k = 0; k < 3; k++) {
+        seen->all |= rgb[k];
+        seen->unlike |= (rgb[k] >> 8 ^ rgb[k]) & 255u;
+    }
+}
 
 static uint32_t level_of(uint32_t number)
 {
@@ -294,21 +282,53 @@ uint32_t pt_builder_cell(const double p[3], const double cell_min[3], double cel
     return pt_morton_code(grid[0], grid[1], grid[2]);
 }
 
-static void route(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+// The bucket of a point, by its level and place.
+static uint16_t target_of(const struct patina_builder *builder, uint32_t number, const double p[3])
+{
+    const uint32_t level = level_of(number), cell = pt_builder_cell(p, builder->cell_min, builder->cell, 3);
+    return (uint16_t)(builder->level_first[level] + (cell >> 3 * (3 - level_bits[level])));
+}
+
+static void assemble(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct batch *batch = context;
     struct patina_builder *builder = batch->builder;
+    const patina_array *arrays[PT_BUILDER_FIELDS];
+    const int colors = builder->desc.narrow_colors && builder->size[COLOR] == 6;
+    struct seen seen = {0, 0};
+    unsigned nonzero = atomic_load(&builder->nonzero);
+    uint64_t invalid = 0;
     (void)thread;
+    for (int k = 0; k < PT_BUILDER_FIELDS; k++)
+        arrays[k] = array_of(batch->piece, k);
     for (uint32_t i = begin * SHARE; i < end * SHARE && i < batch->count; i++) {
-        uint32_t number;
-        if (builder->targets[i] == NOWHERE)
-            continue;
-        memcpy(&number, batch->records + (size_t)i * builder->record + builder->number, sizeof number);
-        const uint32_t level = level_of(number),
-                       cell = pt_builder_cell(builder->places[i], builder->cell_min, builder->cell, 3);
-        builder->targets[i] = (uint16_t)(pt_builder_level_first(level) + (cell >> 3 * (3 - level_bits[level])));
+        char *record = batch->records + (size_t)i * builder->record;
+        const uint64_t from = batch->first + i;
+        const uint32_t number = (uint32_t)(builder->count + i);
+        double *p = builder->places[i];
+        pt_cloud_position(batch->piece, from, p);
+        const int finite = isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
+        invalid += !finite;
+        builder->targets[i] = !finite || (builder->size[OPACITY] && !pt_cloud_draws(batch->piece, from, p)) ? NOWHERE
+                              : builder->placed ? target_of(builder, number, p)
+                                                : 0;
+        for (int k = 0; k < PT_BUILDER_FIELDS; k++)
+            if (builder->size[k])
+                copy_field(record + builder->offset[k], (const char *)arrays[k]->data + from * arrays[k]->stride,
+                           builder->size[k]);
+        memcpy(record + builder->number, &number, sizeof number);
+        if (colors)
+            look_at_color(record + builder->offset[COLOR], &seen);
+        if (nonzero != ALL_FIELDS)
+            nonzero = look_for_values(builder, record, nonzero);
     }
+    atomic_fetch_or(&builder->nonzero, nonzero);
+    atomic_fetch_or(&builder->wide_colors,
+                    (seen.all > 255 ? ABOVE_BYTE : 0) | (seen.all & 255 ? LOW_BYTE : 0) | (seen.unlike ? UNLIKE : 0));
+    atomic_fetch_add(&batch->invalid, invalid);
 }
+
+// ---- places ------------------------------------------------------------------------------------------------------------
 
 static void box_add(double box_min[3], double box_max[3], const double p[3])
 {
@@ -330,11 +350,11 @@ void pt_builder_extend(struct pt_bucket *bucket, const double p[3])
 
 static int place(struct patina_builder *builder, struct batch *batch)
 {
-    pt_parallel(builder->pool, (batch->count + SHARE - 1) / SHARE, 1, route, batch);
     for (uint32_t i = 0; i < batch->count; i++) {
         if (builder->targets[i] == NOWHERE)
             continue;
         struct pt_bucket *bucket = &builder->buckets[builder->targets[i]];
+        builder->drawn++;
         pt_builder_extend(bucket, builder->places[i]);
         pt_tape_write(&builder->spill, &bucket->tape, batch->records + (size_t)i * builder->record, builder->record);
     }
@@ -354,8 +374,10 @@ int pt_builder_drain(struct patina_builder *builder)
         struct batch batch = {.builder = builder, .records = builder->waiting + done * builder->record};
         batch.count = (uint32_t)(left < BATCH ? left : BATCH);
         for (uint32_t i = 0; i < batch.count; i++) {
+            uint32_t number;
+            memcpy(&number, batch.records + (size_t)i * builder->record + builder->number, sizeof number);
             pt_cloud_position(&desc, done + i, builder->places[i]);
-            builder->targets[i] = 0;
+            builder->targets[i] = target_of(builder, number, builder->places[i]);
         }
         error = place(builder, &batch);
     }
@@ -366,13 +388,11 @@ int pt_builder_drain(struct patina_builder *builder)
 
 static int wait_or_place(struct patina_builder *builder, struct batch *batch)
 {
-    for (uint32_t i = 0; i < batch->count; i++)
-        if (builder->targets[i] != NOWHERE) {
-            box_add(builder->box_min, builder->box_max, builder->places[i]);
-            builder->drawn++;
-        }
     if (builder->placed)
         return place(builder, batch);
+    for (uint32_t i = 0; i < batch->count; i++)
+        if (builder->targets[i] != NOWHERE)
+            box_add(builder->box_min, builder->box_max, builder->places[i]);
     if (builder->waiting_count + batch->count > builder->waiting_room) {
         uint16_t *targets = malloc(BATCH * sizeof *targets); // of the batch, which are not places yet
         double(*places)[3] = malloc(BATCH * sizeof *places);
@@ -382,8 +402,10 @@ static int wait_or_place(struct patina_builder *builder, struct batch *batch)
         }
         int error = !targets || !places ? pt_builder_fail(builder, ENOMEM) : pt_builder_drain(builder);
         if (!error) {
-            memcpy(builder->targets, targets, BATCH * sizeof *targets);
             memcpy(builder->places, places, BATCH * sizeof *places);
+            for (uint32_t i = 0; i < batch->count; i++)
+                builder->targets[i] = targets[i] == NOWHERE ? targets[i]
+                                                            : target_of(builder, (uint32_t)builder->count + i, places[i]);
             error = place(builder, batch);
         }
         free(targets);

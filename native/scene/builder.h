@@ -27,8 +27,9 @@ struct patina_builder {
     struct pt_spill spill;
     struct pt_bucket buckets[PT_BUILDER_BUCKETS];
     double cell_min[3], cell; // of the grid of places, 8 a side
-    int placed;               // the grid is known
-    char *waiting;            // records that came before it was
+    uint16_t level_first[PT_BUILDER_LEVELS];
+    int placed;    // the grid is known
+    char *waiting; // records that came before it was
     uint64_t waiting_count, waiting_room;
     double box_min[3], box_max[3];
     uint64_t count, drawn, invalid_positions;

@@ -29,6 +29,8 @@ struct finish {
     uint32_t chunk_room;
     struct pt_tape tapes[PT_ARRAYS];
     uint64_t most; // points at a time
+    char *records; // room for them, once there are any, and for their sorting words
+    uint64_t *words;
     uint64_t done;
     float least_scalar, most_scalar;
     int translucent, any_part;
@@ -118,12 +120,13 @@ static void sum_up(struct finish *finish, const struct patina_cloud *part)
     info->invalid_normals += part->info.invalid_normals;
     info->invalid_colors += part->info.invalid_colors;
     info->radius_most = fmaxf(info->radius_most, part->info.radius_most);
-    for (int k = 0; k < 8; k++)
-        info->class_bits[k] |= part->info.class_bits[k];
+    for (uint32_t c = 0; c < part->chunk_count; c++)
+        for (int k = 0; k < 8; k++)
+            info->class_bits[k] |= part->chunks[c].classes[k];
     for (uint64_t i = 0; part->scalars && i < part->slots; i++)
         if (isfinite(part->scalars[i])) {
-            finish->least_scalar = fminf(finish->least_scalar, part->scalars[i]);
-            finish->most_scalar = fmaxf(finish->most_scalar, part->scalars[i]);
+            finish->least_scalar = part->scalars[i] < finish->least_scalar ? part->scalars[i] : finish->least_scalar;
+            finish->most_scalar = part->scalars[i] > finish->most_scalar ? part->scalars[i] : finish->most_scalar;
         }
     for (uint64_t i = 0; part->opacities && !finish->translucent && i < part->slots; i++)
         finish->translucent = part->opacities[i] < 255;
@@ -158,13 +161,9 @@ static int append_chunks(struct finish *finish, const struct patina_cloud *part)
     return PATINA_OK;
 }
 
-// The part's arrays; what is there of it has its numbers in place of those of the records.
-static int keep_part(struct finish *finish, struct patina_cloud *part, const char *records)
+static int keep_part(struct finish *finish, struct patina_cloud *part)
 {
-    const struct patina_builder *builder = finish->builder;
     const uint64_t slots = part->slots;
-    for (uint64_t i = 0; i < slots; i++)
-        memcpy(&part->order[i], records + (size_t)part->order[i] * builder->record + builder->number, sizeof *part->order);
     sum_up(finish, part);
     const int error = append_chunks(finish, part);
     if (error)
@@ -177,34 +176,68 @@ static int keep_part(struct finish *finish, struct patina_cloud *part, const cha
         tape_of(finish, PT_ARRAY_OPACITIES, part->opacities, slots) ||
         tape_of(finish, PT_ARRAY_RADII, part->radii, slots * 4) ||
         tape_of(finish, PT_ARRAY_SCALARS, part->scalars, slots * 4) || tape_of(finish, PT_ARRAY_CLASSES, part->classes, slots))
-        return pt_builder_fail(finish->builder, builder->spill.error);
+        return pt_builder_fail(finish->builder, finish->builder->spill.error);
     return PATINA_OK;
+}
+
+static void box_of(struct pt_bucket **list, uint32_t n, double box_min[3], double box_max[3])
+{
+    for (int k = 0; k < 3; k++) {
+        box_min[k] = INFINITY;
+        box_max[k] = -INFINITY;
+        for (uint32_t i = 0; i < n; i++) {
+            box_min[k] = fmin(box_min[k], list[i]->box_min[k]);
+            box_max[k] = fmax(box_max[k], list[i]->box_max[k]);
+        }
+    }
+}
+
+struct loading {
+    struct patina_builder *builder;
+    struct pt_bucket **list;
+    char *records;
+    atomic_int error;
+};
+
+static void load_bucket(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct loading *loading = context;
+    const struct patina_builder *builder = loading->builder;
+    uint64_t at = 0;
+    (void)thread;
+    for (uint32_t i = 0; i < end; i++) {
+        const struct pt_tape *tape = &loading->list[i]->tape;
+        const int error = i < begin ? 0 : pt_tape_read(&builder->spill, tape, 0, loading->records + at, tape->size);
+        if (error)
+            atomic_store(&loading->error, error);
+        at += tape->size;
+    }
 }
 
 static int load(struct finish *finish, struct pt_bucket **list, uint32_t n, char *records)
 {
     struct patina_builder *builder = finish->builder;
-    uint64_t at = 0;
-    for (uint32_t i = 0; i < n; i++) {
-        const int error = pt_tape_read(&builder->spill, &list[i]->tape, 0, records + at, list[i]->tape.size);
-        if (error)
-            return pt_builder_fail(builder, error);
-        at += list[i]->tape.size;
+    struct loading loading = {.builder = builder, .list = list, .records = records};
+    pt_parallel(builder->pool, n, 1, load_bucket, &loading);
+    for (uint32_t i = 0; i < n; i++)
         pt_tape_drop(&builder->spill, &list[i]->tape);
-    }
-    return PATINA_OK;
+    return loading.error ? pt_builder_fail(builder, loading.error) : PATINA_OK;
 }
 
 static int make_part(struct finish *finish, struct pt_bucket **list, uint32_t n, uint64_t count)
 {
     struct patina_builder *builder = finish->builder;
-    const uint64_t bytes = count * builder->record;
     const double of_all = builder->drawn ? 0.8 / (double)builder->drawn : 0.0;
     const int shift = narrow_shift(builder), whole = count == builder->drawn;
+    struct pt_build_part of = {.numbers = {.type = PATINA_UINT32, .components = 1, .stride = builder->record}};
     struct patina_cloud *part = NULL;
     patina_cloud_desc desc;
-    char *records = pt_pages_alloc(bytes);
-    int error = records ? load(finish, list, n, records) : PATINA_ERROR_MEMORY;
+    char *const records = finish->records;
+    box_of(list, n, of.box_min, of.box_max);
+    of.numbers.data = records + builder->number;
+    of.words = finish->words;
+    of.scratch = finish->words + finish->most;
+    int error = load(finish, list, n, records);
     if (!error && whole && sort_records(builder, records, count))
         error = PATINA_ERROR_MEMORY;
     if (!error) {
@@ -213,13 +246,12 @@ static int make_part(struct finish *finish, struct pt_bucket **list, uint32_t n,
         pt_builder_view(builder, records, count, &desc);
         desc.color.type = shift >= 0 ? PATINA_UINT8 : desc.color.type;
         share_progress(finish, of_all * (double)finish->done, of_all * (double)(finish->done + count));
-        error = pt_cloud_build(&desc, PT_BUILD_PART, builder->pool, finish->progress, &part);
+        error = pt_cloud_build(&desc, PT_BUILD_FREELY, &of, builder->pool, finish->progress, &part);
     }
     if (!error)
-        error = keep_part(finish, part, records);
+        error = keep_part(finish, part);
     finish->done += count;
     patina_cloud_destroy(part);
-    pt_pages_free(records, bytes);
     return error;
 }
 
@@ -229,15 +261,11 @@ static int make_part(struct finish *finish, struct pt_bucket **list, uint32_t n,
 static int divide(struct finish *finish, struct pt_bucket **list, uint32_t n, int depth, struct pt_bucket *parts)
 {
     struct patina_builder *builder = finish->builder;
-    double box_min[3] = {INFINITY, INFINITY, INFINITY}, box_max[3] = {-INFINITY, -INFINITY, -INFINITY}, edge = 0.0;
+    double box_min[3], box_max[3], edge = 0.0;
     uint64_t count = 0, next = 0;
-    for (uint32_t i = 0; i < n; i++) {
+    for (uint32_t i = 0; i < n; i++)
         count += list[i]->count;
-        for (int k = 0; k < 3; k++) {
-            box_min[k] = fmin(box_min[k], list[i]->box_min[k]);
-            box_max[k] = fmax(box_max[k], list[i]->box_max[k]);
-        }
-    }
+    box_of(list, n, box_min, box_max);
     for (int k = 0; k < 3; k++)
         edge = fmax(edge, box_max[k] - box_min[k]);
     const double cell = edge > 0.0 && isfinite(4.0 / edge) ? 4.0 / edge : 0.0;
@@ -346,23 +374,53 @@ static void add_classes(const struct patina_cloud *cloud, uint32_t *surfels, uin
     }
 }
 
+// A piece of a tape goes into the file while the next one is read.
+struct handing {
+    struct finish *finish;
+    struct pt_cloud_writer *writer;
+    enum pt_array array;
+    char *at_hand, *next;
+    uint64_t size, offset, next_size; // of what is at hand; of the next one
+    int error;
+};
+
+static void hand_on(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct handing *handing = context;
+    const struct patina_builder *builder = handing->finish->builder;
+    (void)thread;
+    for (uint32_t i = begin; i < end; i++)
+        if (i == 0 && handing->size)
+            pt_cloud_writer_add(handing->writer, handing->array, handing->at_hand, handing->size);
+        else if (i == 1 && handing->next_size)
+            handing->error = pt_tape_read(&builder->spill, &handing->finish->tapes[handing->array], handing->offset,
+                                          handing->next, handing->next_size);
+}
+
+// buffer: room for two pieces.
 static int write_tape(struct finish *finish, struct pt_cloud_writer *writer, enum pt_array array, uint64_t wanted, char *buffer)
 {
     struct patina_builder *builder = finish->builder;
     struct pt_tape *tape = &finish->tapes[array];
+    struct handing handing = {.finish = finish, .writer = writer, .array = array, .at_hand = buffer, .next = buffer + PIECE};
     const char end[4] = {0}; // behind bytes that are read as words
     uint32_t chunk = 0;
-    for (uint64_t done = 0; done < tape->size; done += PIECE) {
-        const uint64_t some = tape->size - done < PIECE ? tape->size - done : PIECE;
-        const int error = pt_tape_read(&builder->spill, tape, done, buffer, some);
-        if (error)
-            return pt_builder_fail(builder, error);
+    do {
+        const uint64_t left = tape->size - handing.offset;
+        handing.next_size = left < PIECE ? left : PIECE;
+        pt_parallel(builder->pool, 2, 1, hand_on, &handing);
+        if (handing.error)
+            return pt_builder_fail(builder, handing.error);
         if (pt_progress_cancelled(finish->progress))
             return PATINA_ERROR_CANCELLED;
         if (array == PT_ARRAY_SURFELS)
-            add_classes(&finish->cloud, (uint32_t *)(void *)buffer, done / 4, some / 4, &chunk);
-        pt_cloud_writer_add(writer, array, buffer, some);
-    }
+            add_classes(&finish->cloud, (uint32_t *)(void *)handing.next, handing.offset / 4, handing.next_size / 4, &chunk);
+        char *const done = handing.at_hand;
+        handing.at_hand = handing.next;
+        handing.next = done;
+        handing.size = handing.next_size;
+        handing.offset += handing.next_size;
+    } while (handing.size);
     pt_cloud_writer_add(writer, array, end, wanted - tape->size);
     pt_tape_drop(&builder->spill, tape);
     return PATINA_OK;
@@ -398,7 +456,7 @@ static int write_file(struct finish *finish)
     if (error)
         return error;
     pt_cloud_sections(cloud, sections);
-    char *buffer = malloc(PIECE);
+    char *buffer = malloc(2 * PIECE);
     if (!buffer)
         return PATINA_ERROR_MEMORY;
     if ((error = pt_cloud_writer_begin(finish->builder->path, cloud, &writer))) {
@@ -432,6 +490,14 @@ static void leave_out_zeros(struct patina_builder *builder)
         builder->size[may[i]] = nonzero & 1u << may[i] ? builder->size[may[i]] : 0;
 }
 
+static void free_room(struct finish *finish)
+{
+    pt_pages_free(finish->records, finish->most * finish->builder->record);
+    pt_pages_free(finish->words, finish->most * 2 * sizeof *finish->words);
+    finish->records = NULL;
+    finish->words = NULL;
+}
+
 static int end_build(struct finish *finish)
 {
     struct patina_builder *builder = finish->builder;
@@ -458,7 +524,11 @@ static int end_build(struct finish *finish)
     const uint64_t each = builder->record + 16 + pt_builder_slot_bytes(builder) + 8;
     finish->most = builder->desc.memory / 8 * 5 / each;
     finish->most = finish->most > PART_LEAST ? finish->most : PART_LEAST;
-    error = make_levels(finish);
+    finish->most = finish->most < builder->drawn ? finish->most : builder->drawn;
+    finish->records = pt_pages_alloc(finish->most * builder->record);
+    finish->words = pt_pages_alloc(finish->most * 2 * sizeof *finish->words);
+    error = finish->records && finish->words ? make_levels(finish) : PATINA_ERROR_MEMORY;
+    free_room(finish);
     return error ? error : write_file(finish);
 }
 

@@ -20,18 +20,6 @@ static const uint8_t *element(const patina_array *array, uint64_t index) // stri
     return (const uint8_t *)array->data + index * array->stride;
 }
 
-void pt_read_vector(const patina_array *array, uint64_t index, double v[3])
-{
-    if (array->type == PATINA_FLOAT64) {
-        memcpy(v, element(array, index), 3 * sizeof *v);
-    } else {
-        float f[3];
-        memcpy(f, element(array, index), sizeof f);
-        for (int i = 0; i < 3; i++)
-            v[i] = (double)f[i];
-    }
-}
-
 static int finite3(const double v[3]) { return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]); }
 
 // A point's normal; 0 when it has none (zero or not finite).
@@ -76,13 +64,6 @@ static uint8_t read_opacity(const patina_array *array, uint64_t index)
     return isnan(value) ? 255 : (uint8_t)(255.0 * fmin(fmax(value, 0.0), 1.0) + 0.5);
 }
 
-void pt_cloud_position(const patina_cloud_desc *desc, uint64_t index, double p[3])
-{
-    pt_read_vector(&desc->position, index, p);
-    for (int i = 0; i < 3; i++)
-        p[i] += desc->origin[i];
-}
-
 // Points of opacity 0 would be layers that show nothing.
 int pt_cloud_draws(const patina_cloud_desc *desc, uint64_t index, const double p[3])
 {
@@ -99,10 +80,11 @@ struct build {
     uint64_t *words, *scratch; // Morton code << 32 | id of the drawn points
     uint32_t drawn;
     enum pt_build_kind kind;
-    uint32_t cell_bits;  // the grid of cells has 2^cell_bits cells a side
-    uint32_t *cells;     // first word of each cell, and one past the last
-    uint32_t *begins;    // first word of each chunk
-    uint32_t chunk_room; // chunks that the arrays have room for
+    const struct pt_build_part *part; // of a larger cloud, or NULL
+    uint32_t cell_bits;               // the grid of cells has 2^cell_bits cells a side
+    uint32_t *cells;                  // first word of each cell, and one past the last
+    uint32_t *begins;                 // first word of each chunk
+    uint32_t chunk_room;              // chunks that the arrays have room for
     double box_min[3], box_max[3];
     struct block {
         uint32_t drawn, offset;
@@ -118,13 +100,18 @@ struct build {
     double cell[3], cell_min[3]; // of the Morton grid being coded
 };
 
-enum { BLOCK_POINTS = 1 << 16, LEAST_POINTS = 16, SMALL_CLOUD = 1 << 15 };
+enum {
+    BLOCK_POINTS = 1 << 16,
+    LEAST_POINTS = 16,
+    SMALL_CLOUD = 1 << 15,
+    AHEAD = 16 // points that are asked for before they are read
+};
 
 static void position(const struct build *build, uint64_t index, double p[3]) { pt_cloud_position(&build->desc, index, p); }
 
 static int is_drawn(const struct build *build, uint64_t index, const double p[3])
 {
-    return pt_cloud_draws(&build->desc, index, p);
+    return build->part || pt_cloud_draws(&build->desc, index, p);
 }
 
 static void box_reset(double box_min[3], double box_max[3])
@@ -138,8 +125,8 @@ static void box_reset(double box_min[3], double box_max[3])
 static void box_add(double box_min[3], double box_max[3], const double lower[3], const double upper[3])
 {
     for (int i = 0; i < 3; i++) {
-        box_min[i] = fmin(box_min[i], lower[i]);
-        box_max[i] = fmax(box_max[i], upper[i]);
+        box_min[i] = lower[i] < box_min[i] ? lower[i] : box_min[i];
+        box_max[i] = upper[i] > box_max[i] ? upper[i] : box_max[i];
     }
 }
 
@@ -283,8 +270,8 @@ static int find_cells(struct build *build)
 static int sort_points(struct build *build)
 {
     size_t bytes = (size_t)build->drawn * sizeof *build->words;
-    build->words = pt_pages_alloc(bytes);
-    build->scratch = pt_pages_alloc(bytes);
+    build->words = build->part ? build->part->words : pt_pages_alloc(bytes);
+    build->scratch = build->part ? build->part->scratch : pt_pages_alloc(bytes);
     if (!build->words || !build->scratch)
         return PATINA_ERROR_MEMORY;
     set_grid(build, build->box_min, build->box_max);
@@ -295,7 +282,8 @@ static int sort_points(struct build *build)
         error = find_cells(build);
     if (!error)
         error = refine_range(build, 0, build->drawn, 0);
-    pt_pages_free(build->scratch, bytes);
+    if (!build->part)
+        pt_pages_free(build->scratch, bytes);
     build->scratch = NULL;
     pt_progress_set(build->progress, 0.5);
     return error;
@@ -332,11 +320,15 @@ static void fill_chunk(struct build *build, struct pt_chunk *chunk, const uint64
     double box_min[3], box_max[3], p[3];
     box_reset(box_min, box_max);
     for (uint32_t i = 0; i < chunk->count; i++) {
+        __builtin_prefetch(element(&build->desc.position, order[i + AHEAD < chunk->count ? i + AHEAD : i]));
         position(build, order[i], p);
         box_add(box_min, box_max, p, p);
     }
-    for (int k = 0; k < 3; k++) // exact where the coordinates' spread leaves a bit free: see the 5e6 m case
+    for (int k = 0; k < 3; k++) { // exact where the coordinates' spread leaves a bit free: see the 5e6 m case
         chunk->origin[k] = box_min[k] + 0.5 * (box_max[k] - box_min[k]);
+        chunk->box_min[k] = (float)(box_min[k] - chunk->origin[k]); // roundings keep the order: no offset lies beyond
+        chunk->box_max[k] = (float)(box_max[k] - chunk->origin[k]);
+    }
     for (uint32_t i = 0; i < chunk->padded; i++) {
         if (i >= chunk->count)
             order[i] = order[chunk->count - 1];
@@ -344,22 +336,9 @@ static void fill_chunk(struct build *build, struct pt_chunk *chunk, const uint64
         for (int k = 0; k < 3; k++) {
             float offset = (float)(p[k] - chunk->origin[k]);
             axis[k][i] = offset;
-            chunk->box_min[k] = i ? fminf(chunk->box_min[k], offset) : offset;
-            chunk->box_max[k] = i ? fmaxf(chunk->box_max[k], offset) : offset;
         }
     }
     chunk->spacing = pt_spacing_estimate(axis[0], axis[1], axis[2], chunk->count);
-}
-
-static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
-{
-    struct build *build = context;
-    (void)thread;
-    for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++) {
-        fill_chunk(build, &build->cloud->chunks[c], build->words + build->begins[c]);
-        uint32_t done = atomic_fetch_add_explicit(&build->chunks_done, 1, memory_order_relaxed);
-        pt_progress_raise(build->progress, 0.5 + 0.3 * done / build->cloud->chunk_count);
-    }
 }
 
 // ---- normals -------------------------------------------------------------------------------------------------------
@@ -384,14 +363,6 @@ static void surfel_chunk(struct build *build, uint32_t index)
     for (uint32_t i = chunk->count; i < chunk->padded; i++)
         surfels[i] = surfels[chunk->count - 1];
     pt_chunk_cone(chunk, surfels);
-}
-
-static void surfel_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
-{
-    struct build *build = context;
-    (void)thread;
-    for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++)
-        surfel_chunk(build, c);
 }
 
 // ---- other attributes ----------------------------------------------------------------------------------------------------
@@ -458,6 +429,39 @@ static void attribute_chunks(void *context, uint32_t begin, uint32_t end, uint32
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++)
         attribute_chunk(build, c);
+}
+
+// All but positions.
+static void finish_chunk(struct build *build, uint32_t index)
+{
+    struct patina_cloud *cloud = build->cloud;
+    surfel_chunk(build, index);
+    attribute_chunk(build, index);
+    pt_cloud_values_of(cloud, &build->desc, index);
+    uint32_t *order = cloud->order + cloud->chunks[index].first;
+    for (uint32_t i = 0; build->part && i < cloud->chunks[index].padded; i++)
+        memcpy(&order[i], element(&build->part->numbers, order[i]), sizeof *order);
+}
+
+static void finish_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct build *build = context;
+    (void)thread;
+    for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++)
+        finish_chunk(build, c);
+}
+
+static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct build *build = context;
+    (void)thread;
+    for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++) {
+        fill_chunk(build, &build->cloud->chunks[c], build->words + build->begins[c]);
+        if (build->part) // its records are at hand now
+            finish_chunk(build, c);
+        uint32_t done = atomic_fetch_add_explicit(&build->chunks_done, 1, memory_order_relaxed);
+        pt_progress_raise(build->progress, 0.5 + 0.3 * done / build->cloud->chunk_count);
+    }
 }
 
 // ---- create --------------------------------------------------------------------------------------------------------
@@ -549,41 +553,52 @@ static int allocate(struct build *build)
         return PATINA_ERROR_MEMORY;
     cloud->info.bytes = cloud->slots * (cloud->radii ? 24 : 20) + (cloud->colors ? color_bytes(cloud) : 0) +
                         (cloud->opacities ? opacity_bytes(cloud) : 0) + cloud->chunk_count * sizeof *cloud->chunks;
-    return PATINA_OK;
+    return pt_cloud_values_begin(cloud, &build->desc);
 }
 
-static int build_cloud(struct build *build)
+// How many points are drawn, of each block too, and their box.
+static int measure(struct build *build)
 {
-    struct patina_cloud *cloud = build->cloud;
     build->block_count = (uint32_t)((build->desc.count + BLOCK_POINTS - 1) / BLOCK_POINTS);
     build->blocks = calloc(build->block_count ? build->block_count : 1, sizeof *build->blocks);
     if (!build->blocks)
         return PATINA_ERROR_MEMORY;
-    pt_parallel(build->pool, build->block_count, 1, measure_blocks, build);
+    if (!build->part)
+        pt_parallel(build->pool, build->block_count, 1, measure_blocks, build);
     box_reset(build->box_min, build->box_max);
     for (uint32_t b = 0; b < build->block_count; b++) {
+        if (build->part) {
+            const uint64_t left = build->desc.count - (uint64_t)b * BLOCK_POINTS;
+            build->blocks[b].drawn = (uint32_t)(left < BLOCK_POINTS ? left : BLOCK_POINTS);
+            memcpy(build->blocks[b].box_min, build->part->box_min, sizeof build->part->box_min);
+            memcpy(build->blocks[b].box_max, build->part->box_max, sizeof build->part->box_max);
+        }
         build->blocks[b].offset = build->drawn;
         build->drawn += build->blocks[b].drawn;
         box_add(build->box_min, build->box_max, build->blocks[b].box_min, build->blocks[b].box_max);
     }
     pt_progress_set(build->progress, 0.1);
-    if (pt_progress_cancelled(build->progress))
-        return PATINA_ERROR_CANCELLED;
-    int error = sort_points(build);
-    if (error || (error = cut_chunks(build)) || (error = allocate(build)))
+    return pt_progress_cancelled(build->progress) ? PATINA_ERROR_CANCELLED : PATINA_OK;
+}
+
+static int build_cloud(struct build *build)
+{
+    struct patina_cloud *cloud = build->cloud;
+    int error = measure(build);
+    if (error || (error = sort_points(build)) || (error = cut_chunks(build)) || (error = allocate(build)))
         return error;
     pt_parallel(build->pool, cloud->chunk_count, 1, fill_chunks, build);
-    if (build->kind != PT_BUILD_PART && (error = pt_cloud_settle_built(cloud)))
+    if (!build->part && (error = pt_cloud_settle_built(cloud)))
         return error;
-    pt_parallel(build->pool, cloud->chunk_count, 1, surfel_chunks, build);
+    if (!build->part)
+        pt_parallel(build->pool, cloud->chunk_count, 1, finish_chunks, build);
     pt_progress_set(build->progress, 0.9);
-    pt_parallel(build->pool, cloud->chunk_count, 1, attribute_chunks, build);
     if (pt_progress_cancelled(build->progress))
         return PATINA_ERROR_CANCELLED;
-    if (build->kind != PT_BUILD_PART)
+    if (!build->part) {
         drop_opaque(cloud, build);
-    if ((error = pt_cloud_take_values(cloud, &build->desc)))
-        return error;
+        pt_cloud_values_end(cloud);
+    }
     for (uint32_t b = 0; b < build->block_count; b++)
         cloud->info.invalid_positions += build->blocks[b].invalid_positions;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
@@ -643,18 +658,20 @@ void pt_cloud_begin_info(struct patina_cloud *cloud, const patina_cloud_desc *de
     cloud->color_format = color_format(&desc->color);
 }
 
-int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, struct pt_pool *pool,
-                   struct patina_progress *progress, struct patina_cloud **out)
+int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, const struct pt_build_part *part,
+                   struct pt_pool *pool, struct patina_progress *progress, struct patina_cloud **out)
 {
-    struct build build = {.kind = kind, .desc = *desc, .pool = pool, .progress = progress};
+    struct build build = {.kind = kind, .part = part, .desc = *desc, .pool = pool, .progress = progress};
     int error = PATINA_ERROR_MEMORY;
     *out = build.cloud = pool ? pt_cloud_new() : NULL;
     if (build.cloud) {
         pt_cloud_begin_info(build.cloud, desc);
         error = build_cloud(&build);
     }
-    pt_pages_free(build.words, (size_t)build.drawn * sizeof *build.words);
-    pt_pages_free(build.scratch, (size_t)build.drawn * sizeof *build.scratch);
+    if (!part) {
+        pt_pages_free(build.words, (size_t)build.drawn * sizeof *build.words);
+        pt_pages_free(build.scratch, (size_t)build.drawn * sizeof *build.scratch);
+    }
     free(build.blocks);
     free(build.tallies);
     free(build.cells);
@@ -689,7 +706,7 @@ int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progres
     if (error)
         return error;
     struct pt_pool *pool = pt_pool_create(pt_pool_threads_for(desc.threads, desc.count), 0);
-    error = pt_cloud_build(&desc, PT_BUILD_FREELY, pool, progress, out);
+    error = pt_cloud_build(&desc, PT_BUILD_FREELY, NULL, pool, progress, out);
     pt_pool_destroy(pool);
     return pt_cloud_tell(error, desc.count);
 }

@@ -9,6 +9,7 @@
 #include "sights.h"
 
 #include <stdatomic.h>
+#include <string.h>
 
 // 4096 points: small enough that a chunk's normal cone and box cull well (a torus of 1M points loses 45% of its chunks
 // to the back-face cone), large enough that 96 bytes of chunk_view a frame vanish beside 48 KiB of positions.
@@ -123,9 +124,11 @@ void pt_decode_normal(uint32_t word, double n[3]);
 // Local spacing by sampled nearest neighbours among the `count` points x, y, z.
 float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count);
 
-// Scalars and classes: cloud_values.c. They are taken once chunks and their order stand.
+// Scalars and classes: cloud_values.c. Room for them once chunks stand; those of one, whose order stands, beside others; what all come to.
 int pt_check_values(patina_array *scalar, patina_array *classes);
-int pt_cloud_take_values(struct patina_cloud *cloud, const patina_cloud_desc *desc);
+int pt_cloud_values_begin(struct patina_cloud *cloud, const patina_cloud_desc *desc);
+void pt_cloud_values_of(struct patina_cloud *cloud, const patina_cloud_desc *desc, uint32_t c);
+void pt_cloud_values_end(struct patina_cloud *cloud);
 size_t pt_scalar_bytes(const struct patina_cloud *cloud);
 size_t pt_class_bytes(const struct patina_cloud *cloud);
 
@@ -161,24 +164,56 @@ void pt_alive_release(struct pt_alive *alive);
 
 // Caller's arrays. Checks type (types: bits) and components, and makes the stride explicit; no data is fine.
 int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components, uint32_t most_components);
-// Three components of FLOAT32 or FLOAT64.
-void pt_read_vector(const patina_array *array, uint64_t index, double v[3]);
+// Three components of FLOAT32 or FLOAT64, whose stride is explicit.
+static inline void pt_read_vector(const patina_array *array, uint64_t index, double v[3])
+{
+    const char *at = (const char *)array->data + index * array->stride;
+    float f[3];
+    if (array->type == PATINA_FLOAT64) {
+        memcpy(v, at, 3 * sizeof *v);
+        return;
+    }
+    memcpy(f, at, sizeof f);
+    for (int i = 0; i < 3; i++)
+        v[i] = (double)f[i];
+}
 
 // Building a cloud out of a checked descriptor. FREELY: as many chunks as the points' places ask for. EVENLY: as their number says, so
-// that it is known before. PART, of a larger cloud: its spacings are settled when all parts are there, so that surfels lack their
-// classes, chunks `built`, and opacities stay where all are opaque. The error is not told yet: pt_cloud_tell does it.
-enum pt_build_kind { PT_BUILD_FREELY, PT_BUILD_EVENLY, PT_BUILD_PART };
+// that it is known before. part: of a larger cloud, else NULL. Its spacings are settled when all parts are there, so that surfels lack their
+// classes, chunks `built`, and opacities stay where all are opaque; nor is it said what values it has. The error is not told yet:
+// pt_cloud_tell does it.
+enum pt_build_kind { PT_BUILD_FREELY, PT_BUILD_EVENLY };
+struct pt_build_part {             // all points are drawn
+    double box_min[3], box_max[3]; // of their places, exactly
+    patina_array numbers;          // uint32_t, in the whole cloud, which take the place of those in the part
+    uint64_t *words, *scratch;     // room for a word of each point
+};
 int pt_cloud_check_desc(patina_cloud_desc *desc);
 void pt_cloud_begin_info(struct patina_cloud *cloud, const patina_cloud_desc *desc);
-int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, struct pt_pool *pool,
-                   struct patina_progress *progress, struct patina_cloud **out);
+int pt_cloud_build(const patina_cloud_desc *desc, enum pt_build_kind kind, const struct pt_build_part *part,
+                   struct pt_pool *pool, struct patina_progress *progress, struct patina_cloud **out);
 int pt_cloud_tell(int error, uint64_t points);
-void pt_cloud_position(const patina_cloud_desc *desc, uint64_t index, double p[3]); // object units
+static inline void pt_cloud_position(const patina_cloud_desc *desc, uint64_t index, double p[3]) // object units
+{
+    pt_read_vector(&desc->position, index, p);
+    for (int i = 0; i < 3; i++)
+        p[i] += desc->origin[i];
+}
 int pt_cloud_draws(const patina_cloud_desc *desc, uint64_t index, const double p[3]);
 
 // Sorts (code << 32 | id) words by their upper 30 bits; scratch has room for as many. The result is in words.
 int pt_morton_sort(struct pt_pool *pool, uint64_t *words, uint64_t *scratch, uint32_t count);
+static inline uint32_t pt_morton_spread(uint32_t v)
+{
+    v = (v | v << 16) & 0x030000FFu;
+    v = (v | v << 8) & 0x0300F00Fu;
+    v = (v | v << 4) & 0x030C30C3u;
+    return (v | v << 2) & 0x09249249u;
+}
 // 30-bit Morton code of integer coordinates 0..1023.
-uint32_t pt_morton_code(uint32_t x, uint32_t y, uint32_t z);
+static inline uint32_t pt_morton_code(uint32_t x, uint32_t y, uint32_t z)
+{
+    return pt_morton_spread(x) | pt_morton_spread(y) << 1 | pt_morton_spread(z) << 2;
+}
 
 #endif

@@ -36,6 +36,9 @@ int pt_check_values(patina_array *scalar, patina_array *classes)
     return error ? error : pt_check_array(classes, "classes", 1u << PATINA_UINT8, 1, 1);
 }
 
+// As the type of `value` lies there.
+#define READ(value) (memcpy(&(value), at, sizeof(value)), (float)(value))
+
 static float read_value(const patina_array *array, uint64_t index)
 {
     const char *at = (const char *)array->data + index * array->stride;
@@ -49,16 +52,15 @@ static float read_value(const patina_array *array, uint64_t index)
         int16_t i16;
         int32_t i32;
     } v;
-    memcpy(&v, at, pt_type_size(array->type));
     switch (array->type) {
-    case PATINA_FLOAT32: return v.f;
-    case PATINA_FLOAT64: return (float)v.d;
-    case PATINA_UINT8: return v.u8;
-    case PATINA_UINT16: return v.u16;
-    case PATINA_UINT32: return (float)v.u32;
-    case PATINA_INT8: return v.i8;
-    case PATINA_INT16: return v.i16;
-    default: return (float)v.i32;
+    case PATINA_FLOAT32: return READ(v.f);
+    case PATINA_FLOAT64: return READ(v.d);
+    case PATINA_UINT8: return READ(v.u8);
+    case PATINA_UINT16: return READ(v.u16);
+    case PATINA_UINT32: return READ(v.u32);
+    case PATINA_INT8: return READ(v.i8);
+    case PATINA_INT16: return READ(v.i16);
+    default: return READ(v.i32);
     }
 }
 
@@ -66,20 +68,27 @@ static float read_value(const patina_array *array, uint64_t index)
 
 size_t pt_scalar_bytes(const struct patina_cloud *cloud) { return cloud->slots * sizeof *cloud->scalars; }
 
+static void measure_scalars(struct patina_cloud *cloud, const float *values)
+{
+    float least = INFINITY, most = -INFINITY;
+    for (uint64_t i = 0; values && i < cloud->slots; i++)
+        if (isfinite(values[i])) {
+            least = values[i] < least ? values[i] : least;
+            most = values[i] > most ? values[i] : most;
+        }
+    cloud->info.scalar_range[0] = least <= most ? least : 0.0f;
+    cloud->info.scalar_range[1] = least <= most ? most : 0.0f;
+}
+
 static int take_scalars(struct patina_cloud *cloud, const patina_array *scalar)
 {
     size_t size = pt_scalar_bytes(cloud);
     float *values = scalar->data && size ? pt_pages_alloc(size) : NULL;
     if (scalar->data && size && !values)
         return PATINA_ERROR_MEMORY;
-    float least = INFINITY, most = -INFINITY;
-    for (uint64_t i = 0; values && i < cloud->slots; i++) {
+    for (uint64_t i = 0; values && i < cloud->slots; i++)
         values[i] = read_value(scalar, pt_number_of(cloud, i));
-        least = isfinite(values[i]) ? fminf(least, values[i]) : least;
-        most = isfinite(values[i]) ? fmaxf(most, values[i]) : most;
-    }
-    cloud->info.scalar_range[0] = least <= most ? least : 0.0f;
-    cloud->info.scalar_range[1] = least <= most ? most : 0.0f;
+    measure_scalars(cloud, values);
     cloud->info.bytes += (values ? size : 0) - (cloud->scalars ? size : 0);
     cloud->mapped &= ~(1u << PT_ARRAY_SCALARS);
     pt_pages_free(cloud->scalars, size);
@@ -135,30 +144,50 @@ int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float ran
 
 size_t pt_class_bytes(const struct patina_cloud *cloud) { return cloud->slots + 4; } // kernels read bytes as words
 
-static int take_classes(struct patina_cloud *cloud, const patina_array *classes)
+static void classes_of(struct patina_cloud *cloud, const patina_array *classes, struct pt_chunk *chunk)
 {
-    cloud->classes = pt_pages_alloc(pt_class_bytes(cloud));
-    if (!cloud->classes)
-        return PATINA_ERROR_MEMORY;
-    cloud->info.bytes += pt_class_bytes(cloud);
-    cloud->info.has_classes = 1;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
-        struct pt_chunk *chunk = &cloud->chunks[c];
-        for (uint32_t i = 0; i < chunk->padded; i++) {
-            const uint32_t slot = chunk->first + i;
-            uint8_t class = *((const uint8_t *)classes->data + pt_number_of(cloud, slot) * classes->stride);
-            cloud->classes[slot] = class;
-            chunk->classes[class / 32] |= 1u << class % 32;
-        }
-        for (int k = 0; k < 8; k++)
-            cloud->info.class_bits[k] |= chunk->classes[k];
+    for (uint32_t i = 0; i < chunk->padded; i++) {
+        const uint32_t slot = chunk->first + i;
+        const uint8_t class = *((const uint8_t *)classes->data + pt_number_of(cloud, slot) * classes->stride);
+        cloud->classes[slot] = class;
+        chunk->classes[class / 32] |= 1u << class % 32;
     }
-    cloud->class_hash = pt_fingerprint(1, cloud->classes, cloud->slots);
+}
+
+// ---- both, of a cloud that is being built ----------------------------------------------------------------------------------
+
+int pt_cloud_values_begin(struct patina_cloud *cloud, const patina_cloud_desc *desc)
+{
+    cloud->info.has_scalars = desc->scalar.data != NULL;
+    cloud->info.has_classes = desc->classes.data != NULL;
+    if (desc->scalar.data && cloud->slots) {
+        if (!(cloud->scalars = pt_pages_alloc(pt_scalar_bytes(cloud))))
+            return PATINA_ERROR_MEMORY;
+        cloud->info.bytes += pt_scalar_bytes(cloud);
+    }
+    if (desc->classes.data) {
+        if (!(cloud->classes = pt_pages_alloc(pt_class_bytes(cloud))))
+            return PATINA_ERROR_MEMORY;
+        cloud->info.bytes += pt_class_bytes(cloud);
+    }
     return PATINA_OK;
 }
 
-int pt_cloud_take_values(struct patina_cloud *cloud, const patina_cloud_desc *desc)
+void pt_cloud_values_of(struct patina_cloud *cloud, const patina_cloud_desc *desc, uint32_t c)
 {
-    int error = take_scalars(cloud, &desc->scalar);
-    return error || !desc->classes.data ? error : take_classes(cloud, &desc->classes);
+    struct pt_chunk *chunk = &cloud->chunks[c];
+    for (uint64_t i = chunk->first; cloud->scalars && i < chunk->first + chunk->padded; i++)
+        cloud->scalars[i] = read_value(&desc->scalar, pt_number_of(cloud, i));
+    if (cloud->classes)
+        classes_of(cloud, &desc->classes, chunk);
+}
+
+void pt_cloud_values_end(struct patina_cloud *cloud)
+{
+    measure_scalars(cloud, cloud->scalars);
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        for (int k = 0; k < 8; k++)
+            cloud->info.class_bits[k] |= cloud->chunks[c].classes[k];
+    if (cloud->classes)
+        cloud->class_hash = pt_fingerprint(1, cloud->classes, cloud->slots);
 }

@@ -8,16 +8,6 @@
 
 enum { DIGIT_BITS = 10, DIGITS = 1 << DIGIT_BITS, BLOCKS = 64 };
 
-static uint32_t spread(uint32_t v)
-{
-    v = (v | v << 16) & 0x030000FFu;
-    v = (v | v << 8) & 0x0300F00Fu;
-    v = (v | v << 4) & 0x030C30C3u;
-    return (v | v << 2) & 0x09249249u;
-}
-
-uint32_t pt_morton_code(uint32_t x, uint32_t y, uint32_t z) { return spread(x) | spread(y) << 1 | spread(z) << 2; }
-
 struct sort {
     const uint64_t *from;
     uint64_t *to;

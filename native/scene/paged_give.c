@@ -93,7 +93,7 @@ int patina_cloud_page_give(patina_cloud *cloud, uint32_t index, const patina_clo
         return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "page %u is there already", index);
     checked.threads = 1; // pages come side by side
     struct pt_pool *pool = pt_pool_create(checked.threads, 0);
-    error = pt_cloud_tell(pt_cloud_build(&checked, PT_BUILD_EVENLY, pool, NULL, &made), checked.count);
+    error = pt_cloud_tell(pt_cloud_build(&checked, PT_BUILD_EVENLY, NULL, pool, NULL, &made), checked.count);
     pt_pool_destroy(pool);
     error = error ? pt_fail_again(&cloud->handle, error) : check_page(cloud, index, made);
     if (!error) {

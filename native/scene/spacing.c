@@ -10,7 +10,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { SAMPLES = 24, NEIGHBOURS = 6 };
+enum { SAMPLES = 24, NEIGHBOURS = 6, BLOCK = 32 };
 
 // Squared distance from point `at` to its k-th nearest neighbour (k <= NEIGHBOURS).
 static float kth_nearest(const float *x, const float *y, const float *z, uint32_t count, uint32_t at, uint32_t k)
@@ -18,15 +18,23 @@ static float kth_nearest(const float *x, const float *y, const float *z, uint32_
     float nearest[NEIGHBOURS];
     for (uint32_t i = 0; i < k; i++)
         nearest[i] = INFINITY;
-    for (uint32_t i = 0; i < count; i++) {
-        float dx = x[i] - x[at], dy = y[i] - y[at], dz = z[i] - z[at];
-        float d = dx * dx + dy * dy + dz * dz;
-        if (!(d < nearest[k - 1]) || i == at)
-            continue;
-        uint32_t place = k - 1;
-        for (; place > 0 && nearest[place - 1] > d; place--)
-            nearest[place] = nearest[place - 1];
-        nearest[place] = d;
+    for (uint32_t first = 0; first < count; first += BLOCK) { // of most blocks no point is near
+        const uint32_t some = count - first < BLOCK ? count - first : BLOCK;
+        float d[BLOCK];
+        uint32_t near = 0;
+        for (uint32_t i = 0; i < some; i++) {
+            const float dx = x[first + i] - x[at], dy = y[first + i] - y[at], dz = z[first + i] - z[at];
+            d[i] = dx * dx + dy * dy + dz * dz;
+            near |= d[i] < nearest[k - 1];
+        }
+        for (uint32_t i = 0; i < some && near; i++) {
+            if (!(d[i] < nearest[k - 1]) || first + i == at)
+                continue;
+            uint32_t place = k - 1;
+            for (; place > 0 && nearest[place - 1] > d[i]; place--)
+                nearest[place] = nearest[place - 1];
+            nearest[place] = d[i];
+        }
     }
     return nearest[k - 1];
 }
