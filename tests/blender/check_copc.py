@@ -2,14 +2,16 @@
 """COPC without conversion: the picture of a flat import, of no more points than it shows; from a disk, and from servers good and bad."""
 
 import http.server
+import sys
 import threading
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 
 import bpy
 import numpy as np
 from check_formats import with_laspy
-from copc_files import points_of, write_copc
+from copc_files import claim, points_of, too_fine, write_copc
 from harness import SCRATCH, check, new_scene, render, reports, stats
 from mathutils import Matrix
 from patina import native, streaming
@@ -119,6 +121,55 @@ def test_a_small_one_is_read_whole():
     obj.patina.stream = 'ON'
     render()
     check(stream_of().cloud.count == POINTS, "it is not streamed")
+
+
+def test_more_points_than_a_cloud_holds():
+    """The coarser levels are there, in the same bytes as without the others; what is left out is told."""
+    path, entries, _ = made("few.copc.laz")
+    huge, finer = SCRATCH / "huge.copc.laz", too_fine(1 + max(key[0] for key, *_ in entries))
+    claim(path, huge, entries, finer)
+    pictures = []
+    for name in (path, huge):
+        clouds.CACHE.clear()
+        new_scene()
+        reports.clear()
+        objects = import_copc(name, 'ON' if name is path else 'AUTO')
+        objects[0].patina.analysis = 'OFF'
+        see(objects)
+        pictures.append(render())
+        check(stream_of().cloud.pages()["points"] == POINTS, f"{stream_of().cloud.pages()}")
+    said = " ".join(text for _, text in reports)
+    levels = len({key[0] for key, *_ in entries})
+    check(f"{POINTS:,} of {POINTS + sum(count for _, count in finer):,} points are read, the {levels} coarser of {levels + 1} levels" in said and
+          "a cloud holds 2,147,483,647" in said and str(huge) in said, said)
+    for plane, pixels in pictures[0].items():
+        check((pixels == pictures[1][plane]).all(), f"{plane} differs")
+    print(f"  {said}")
+
+
+def test_what_a_cloud_holds():
+    """The library takes what the reader takes for enough; a slot more is a level less."""
+    sys.path.insert(0, str(Path(streaming.__file__).parent))  # as the process that reads has it
+    import copc
+    from source import SourceError
+    sys.path.pop(0)
+    counts = np.array([1 << 24] * 127 + [4096 * ((2 ** 31 - 1 - 127 * ((1 << 24) + 15 * 4096)) // (4096 + 15))])
+    nodes = np.zeros(len(counts), copc.ENTRY)
+    nodes["key"][:, 0], nodes["count"] = np.minimum(np.arange(len(counts)), 10), counts
+    fit, told = copc.coarser(nodes)
+    check(len(fit) == len(nodes) and not told, told)
+    box, parents = np.tile([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], (len(counts), 1)), np.full(len(counts), native.NO_PAGE, np.uint32)
+    with native.Cloud.begin(box, np.ones(len(counts)), counts.astype(np.uint32), parents, "", False, False, ([0.0] * 3, [1.0] * 3)) as cloud:
+        check(cloud.pages()["points"] == counts.sum(), f"{cloud.pages()}")
+    nodes["count"][-1] += 4096
+    fit, told = copc.coarser(nodes)
+    check(len(fit) == 10 and "the 10 coarser of 11 levels" in told, f"{len(fit)}: {told}")
+    nodes["key"][:, 0] = 1
+    try:
+        copc.coarser(nodes)
+        check(False, "a level that does not fit is read")
+    except SourceError as error:
+        check("its coarsest level alone" in str(error), str(error))
 
 
 def test_damaged_files():

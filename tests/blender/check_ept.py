@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from check_copc import import_copc, in_a_hurry, made, open_address, same, see, server, stream_of
 from check_formats import with_laspy
-from copc_files import points_of
+from copc_files import points_of, too_fine
 from ept_files import write_ept
 from harness import SCRATCH, check, new_scene, render, reports, stats
 from patina.sync import clouds
@@ -59,6 +59,18 @@ def test_ept_has_the_bytes_of_a_copc():
         equal(wanted[name], found, f"{name} {how}")
         stream = stream_of()
         print(f"  {name} {how}: {stream.arrived} of {len(counts)} nodes")
+
+
+def test_ept_of_more_points_than_a_cloud_holds():
+    folder, counts = tiles("huge")
+    wanted = shown(folder / "ept.json")
+    check(not reports, f"{reports}")
+    finer = too_fine(1 + max(int(key.partition("-")[0]) for key in counts))
+    (folder / "ept-hierarchy" / "0-0-0-0.json").write_text(json.dumps(counts | {"-".join(map(str, key)): count for key, count in finer}))
+    found = shown(folder / "ept.json")
+    said = " ".join(text for _, text in reports)
+    check(f"{POINTS:,} of {POINTS + sum(count for _, count in finer):,} points are read" in said, said)
+    equal(wanted, found, "the coarser levels")
 
 
 def test_ept_scalars_and_classes():

@@ -68,6 +68,22 @@ def write_copc(path, records, offset=(0.0, 0.0, 0.0), least=400, wkt="", pages=F
     return entries
 
 
+def too_fine(depth, nodes=1400, count=1 << 24):
+    """(key, count) of nodes that nobody made: billions of points, finer than all others."""
+    side = np.arange(nodes)
+    return [((depth, int(x), int(y), int(z)), count) for x, y, z in zip(side % 16, side // 16 % 16, side // 256, strict=True)]
+
+
+def claim(path, to, entries, more):
+    """The COPC in `path` again, whose hierarchy tells of `more`, too, which lie nowhere."""
+    data = bytearray(path.read_bytes())
+    rows = b"".join(struct.pack("<4iQii", *key, offset, size, count)
+                    for key, offset, size, count in [*entries, *((key, 1 << 40, 1000, count) for key, count in more)])
+    struct.pack_into("<2Q", data, 469, len(data), len(rows))
+    struct.pack_into("<Q", data, 247, sum(entry[3] for entry in entries) + sum(count for _, count in more))
+    to.write_bytes(bytes(data) + rows)
+
+
 def nodes_of(records, half, least):
     """(key, records) by depth: each node keeps `least` points of its cube, evenly taken, the rest goes to its children."""
     found, waiting = [], [((0, 0, 0, 0), records)]
