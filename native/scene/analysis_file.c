@@ -81,7 +81,7 @@ static int analyse(struct patina_cloud *cloud, const patina_analysis_desc *desc,
     struct pt_store room, *store = stored ? &room : NULL;
     struct pt_analysis analysis;
     int error = ask_for_room(path, cloud, stored);
-    error = error ? error : pt_pages_refuse(cloud, memory, progress);
+    error = error ? error : pt_pages_refuse(cloud, memory / 2, progress);
     if (error) {
         patina_cloud_destroy(cloud);
         return error;

@@ -14,6 +14,8 @@ void pt_store_open(struct pt_store *store, const char *beside, const struct pati
 {
     *store = (struct pt_store){.beside = beside, .cloud = cloud, .memory = memory, .cap = memory / 8 * CAP_EIGHTHS};
     pt_look_begin(&store->look, store->cap, WRITTEN);
+    if (cloud && cloud->mapped)
+        pt_cloud_return(cloud); // what was read of it before counts below the cap
     store->before = pt_file_memory();
 }
 

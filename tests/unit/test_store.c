@@ -3,6 +3,7 @@
 // whatever the points are. Files of saved clouds likewise; what is cancelled, killed or has no room on the disk leaves no file.
 #include "base/platform.h"
 #include "scene/analysis.h"
+#include "scene/page_sums.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 
@@ -261,6 +262,31 @@ static void test_same(void **state)
         }
 }
 
+#ifdef __linux__
+// What was read of a file before its analysis begins counts below the cap.
+static void test_read_before(void **state)
+{
+    (void)state;
+    struct scan scan = statue(MANY);
+    patina_cloud *cloud = cloud_of(&scan, 1), *mapped = NULL;
+    struct pt_store store;
+    CHECK(patina_cloud_save(cloud, at("one")), cloud);
+    patina_cloud_destroy(cloud);
+    CHECK(patina_cloud_open(at("one"), &mapped), NULL);
+    const uint64_t before = pt_file_memory(), size = pt_cloud_mapped_bytes(mapped);
+    CHECK(pt_pages_refuse(mapped, UINT64_MAX, NULL), mapped);
+    const uint64_t read = pt_file_memory();
+    pt_store_open(&store, at("one"), mapped, LITTLE);
+    print_message("of a file of %.1f MB %.1f MB are held when all was read, %.1f MB when its analysis begins\n",
+                  1e-6 * (double)size, 1e-6 * ((double)read - (double)before), 1e-6 * ((double)store.before - (double)before));
+    assert_true(read > before + size / 2);
+    assert_true(store.before < before + size / 4);
+    pt_store_close(&store);
+    patina_cloud_destroy(mapped);
+    scan_free(&scan);
+}
+#endif
+
 // ---- files -----------------------------------------------------------------------------------------------------------------
 
 static void save_plain(const struct scan *scan, int which)
@@ -423,9 +449,12 @@ static int remove_folder(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_same),      cmocka_unit_test(test_files),  cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_same),        cmocka_unit_test(test_files),  cmocka_unit_test(test_refused),
+#ifdef __linux__
+        cmocka_unit_test(test_read_before),
+#endif
 #ifndef _WIN32
-        cmocka_unit_test(test_full_disk), cmocka_unit_test(test_killed),
+        cmocka_unit_test(test_full_disk),   cmocka_unit_test(test_killed),
 #endif
     };
 #ifdef _WIN32
