@@ -11,8 +11,8 @@ int main(int count, char **arguments)
     const unsigned long across = count > 2 ? strtoul(arguments[2], NULL, 10) : 0;
     const unsigned long points = count > 3 ? strtoul(arguments[3], NULL, 10) : 1000000;
     const unsigned long levels = count > 4 ? strtoul(arguments[4], NULL, 10) : 1;
-    if (count < 3 || across < 1 || across > 45 || points < 1000 || points > 4000000 || levels < 1 || levels > 6) {
-        fputs("town OUT.cloud ACROSS [POINTS [LEVELS]]: 1 to 45 quarters a side, of 1000 to 4000000 points each, in 1 to 6 "
+    if (count < 3 || across < 1 || across > 45 || points < 1000 || points > 4000000 || levels < 1 || levels > 9) {
+        fputs("town OUT.cloud ACROSS [POINTS [LEVELS]]: 1 to 45 quarters a side, of 1000 to 4000000 points each, in 1 to 9 "
               "levels\n",
               stderr);
         return 2;

@@ -6,7 +6,7 @@
 #include <patina/patina.h>
 #include <stdint.h>
 
-enum { LEVELS_MOST = 6 };
+enum { LEVELS_MOST = 9 };
 
 struct level {
     uint32_t chunk, chunk_end;
