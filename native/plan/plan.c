@@ -315,13 +315,16 @@ static const struct {
 #undef PT_X
 };
 
+// Keys are least ones, whoever comes first: discs lie near, and what they hide scatter need not look at.
+static const enum pt_kind by_sight[PT_AS_COUNT] = {PT_AS_DISCS, PT_AS_POINTS, PT_AS_RANGES, PT_AS_SOFT, PT_AS_MESH};
+
 // What the measured pixels show: of all kinds that filling comes behind.
 static void plan_measured(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    for (int kind = 0; kind < PT_AS_COUNT; kind++)
-        if (work_of[kind].see)
-            work_of[kind].see(builder);
+    for (int k = 0; k < PT_AS_COUNT; k++)
+        if (work_of[by_sight[k]].see)
+            work_of[by_sight[k]].see(builder);
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count && work_of[plan->instances[i].kind].show)
             work_of[plan->instances[i].kind].show(builder, i);

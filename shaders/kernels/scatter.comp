@@ -85,7 +85,7 @@ void main()
         if (z_bits < atomicMin(keys[2u * pixel + 1u], z_bits))
             keys[2u * pixel] = PT_KEY_EMPTY_ID; // all who come here write this
 #else
-        atomicMin(keys[2u * pixel + 1u], z_bits);
+        atomicMin(keys[2u * pixel + 1u], z_bits); // a disc's id that was there is greater than any point's
 #endif
 #elif PASS == 1
         atomicMin(keys[2u * pixel], chunk.id_base + id);
