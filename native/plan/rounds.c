@@ -27,9 +27,11 @@ enum pt_pass_role pt_pass_role(const struct pt_pass *pass)
     }
 }
 
-uint32_t pt_pass_keys(const struct pt_pass *pass, uint32_t *width)
+uint32_t pt_pass_keys(const struct pt_pass *pass, uint32_t *width, uint32_t *height)
 {
-    *width = ((const struct scatter_args *)pass->arguments)->view.width;
+    const struct scatter_args *args = pass->arguments;
+    *width = args->view.width;
+    *height = args->view.height;
     return PT_BUF_scatter_keys;
 }
 
@@ -67,6 +69,14 @@ static uint32_t copied_of(uint32_t which, const struct patina_cloud *cloud)
     }
 }
 
+static uint32_t bytes_of(const struct pt_chunk_list *list, uint32_t arrays)
+{
+    uint32_t bytes = 0;
+    for (int i = 0; i < PT_ARRAYS; i++)
+        bytes += arrays >> i & 1u ? pt_cloud_point_bytes(list->cloud, (enum pt_array)i) : 0;
+    return bytes;
+}
+
 uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, struct pt_chunk_list *lists)
 {
     uint32_t count = 0;
@@ -91,16 +101,10 @@ uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, s
                 list->arrays |= array_bit((enum pt_instance_buffer)pass->refs[i].which, cloud);
                 list->copied += copied_of(pass->refs[i].which, cloud);
             }
+        list->each[0] = bytes_of(list, list->arrays & ~list->culled);
+        list->each[1] = bytes_of(list, list->arrays);
     }
     return count;
-}
-
-static uint32_t bytes_of(const struct pt_chunk_list *list, uint32_t arrays)
-{
-    uint32_t bytes = 0;
-    for (int i = 0; i < PT_ARRAYS; i++)
-        bytes += arrays >> i & 1u ? pt_cloud_point_bytes(list->cloud, (enum pt_array)i) : 0;
-    return bytes;
 }
 
 int pt_next_range(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, struct pt_chunk_range *range)
@@ -109,9 +113,8 @@ int pt_next_range(const struct pt_chunk_list *lists, uint32_t count, uint64_t mo
     *range = (struct pt_chunk_range){.list = list, .chunk = chunk};
     for (; list < count; list++, chunk = 0) {
         const struct pt_chunk_list *at = &lists[list];
-        const uint64_t all = bytes_of(at, at->arrays), facing = bytes_of(at, at->arrays & ~at->culled);
         for (; chunk < at->count; chunk++, some = 1) {
-            const uint64_t bytes = at->chunks[chunk].padded * (at->chunks[chunk].cull ? all : facing);
+            const uint64_t bytes = pt_chunk_bytes(at, &at->chunks[chunk]);
             if (some && range->bytes + bytes > most)
                 goto full;
             range->bytes += bytes;

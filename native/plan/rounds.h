@@ -10,10 +10,11 @@ struct pt_chunk_list {
     const struct patina_cloud *cloud;
     const struct chunk_view *chunks;
     uint32_t count;
-    uint32_t arrays; // bits 1 << pt_array
-    uint32_t ref;    // of the pass: the chunks'
-    uint32_t copied; // bytes a slot that a device takes which copies clouds
-    uint32_t culled; // of the arrays those that only chunks with a cone to be tested are read of
+    uint32_t arrays;  // bits 1 << pt_array
+    uint32_t ref;     // of the pass: the chunks'
+    uint32_t copied;  // bytes a slot that a device takes which copies clouds
+    uint32_t culled;  // of the arrays those that only chunks with a cone to be tested are read of
+    uint32_t each[2]; // bytes of files a slot: of other chunks, and of those
 };
 
 // From a chunk of a list up to another: `end` is not of it.
@@ -36,11 +37,15 @@ enum pt_pass_role {
 };
 enum pt_pass_role pt_pass_role(const struct pt_pass *pass);
 // Of a pass whose role is PT_ROLE_KEYS: which of its references the keys are, and how many of them a row has.
-uint32_t pt_pass_keys(const struct pt_pass *pass, uint32_t *width);
+uint32_t pt_pass_keys(const struct pt_pass *pass, uint32_t *width, uint32_t *height);
 // Whether it writes least keys of points.
 static inline int pt_is_of_parts(const struct pt_pass *pass) { return pt_pass_role(pass) >= PT_ROLE_KEYS; }
 // The lists of a pass, all their chunks; lists: room for as many as the pass has references. Returns how many.
 uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, struct pt_chunk_list *lists);
+static inline uint64_t pt_chunk_bytes(const struct pt_chunk_list *list, const struct chunk_view *chunk)
+{
+    return (uint64_t)chunk->padded * list->each[chunk->cull != 0];
+}
 // The next range, of no more bytes than `most` but of one chunk at least; 0: there is none. *range: the last one, or zero.
 int pt_next_range(const struct pt_chunk_list *lists, uint32_t count, uint64_t most, struct pt_chunk_range *range);
 // In how many of them a pass runs; *bytes: of all. 0 where it reads no file.

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "hiding.h"
 
-#include "hidden.h"
-
 #include <stdlib.h>
 
 static void sort_from_near(const struct pt_chunk_list *list, struct chunk_view *out)
@@ -16,18 +14,23 @@ static void sort_from_near(const struct pt_chunk_list *list, struct chunk_view *
         out[next[pt_depth_step(&list->chunks[c])]++] = list->chunks[c];
 }
 
-int pt_hiding_begin(struct pt_hiding *hiding, const struct pt_chunk_list *lists, uint32_t count)
+int pt_hiding_begin(struct pt_hiding *hiding, const struct pt_chunk_list *lists, uint32_t count, const uint64_t *keys,
+                    uint32_t width, uint32_t height)
 {
     size_t chunks = 0;
     for (uint32_t i = 0; i < count; i++)
         chunks += lists[i].count;
-    hiding->count = count;
-    hiding->lists = malloc((count + (size_t)1) * sizeof *lists);
+    *hiding = (struct pt_hiding){.count = count};
+    hiding->lists = malloc((3 * (size_t)count + 1) * sizeof *lists);
     hiding->chunks = malloc((chunks + 1) * sizeof *hiding->chunks);
-    if (!hiding->lists || !hiding->chunks) {
+    hiding->next = calloc(count + pt_tile_count(width, height) + 1, sizeof *hiding->next);
+    if (!hiding->lists || !hiding->chunks || !hiding->next) {
         pt_hiding_end(hiding);
         return 0;
     }
+    hiding->rounds[0] = hiding->lists + count;
+    hiding->rounds[1] = hiding->rounds[0] + count;
+    pt_tiles_begin(keys, width, height, hiding->next + count, &hiding->tiles);
     struct chunk_view *out = hiding->chunks;
     for (uint32_t i = 0; i < count; i++) {
         hiding->lists[i] = lists[i];
@@ -42,38 +45,47 @@ void pt_hiding_end(struct pt_hiding *hiding)
 {
     free(hiding->lists);
     free(hiding->chunks);
-    hiding->lists = NULL;
-    hiding->chunks = NULL;
+    free(hiding->next);
+    *hiding = (struct pt_hiding){0};
 }
 
-// What is hidden of list i from one chunk up to another. Returns how many.
-static uint32_t hide(const struct pt_hiding *hiding, uint32_t i, uint32_t first, uint32_t end)
+// Takes list i's next chunks of the step at hand into a round, where they lie side by side. 0: one found no room.
+static int take(struct pt_hiding *hiding, uint32_t i, uint64_t most, struct pt_chunk_list *round, uint64_t *bytes, int *some)
 {
-    struct chunk_view *chunks = hiding->chunks + (hiding->lists[i].chunks - hiding->chunks);
-    uint32_t hidden = 0;
-    for (uint32_t c = first; c < end; c++)
-        if (pt_is_hidden(&chunks[c], hiding->keys, hiding->width)) {
-            chunks[c].count = chunks[c].padded = 0;
-            hidden++;
+    const struct pt_chunk_list *list = &hiding->lists[i];
+    struct chunk_view *chunks = hiding->chunks + (round->chunks - hiding->chunks);
+    for (uint32_t c = hiding->next[i]; c < list->count && pt_depth_step(&list->chunks[c]) == hiding->depth; c++) {
+        const struct chunk_view *chunk = &list->chunks[c];
+        const uint64_t own = pt_chunk_bytes(list, chunk);
+        if (!pt_is_hidden(chunk, &hiding->tiles)) {
+            if (*some && *bytes + own > most)
+                return 0;
+            chunks[round->count++] = *chunk;
+            *bytes += own;
+            *some = 1;
         }
-    return hidden;
-}
-
-int pt_hiding_next(const struct pt_hiding *hiding, uint64_t most, struct pt_chunk_range *range)
-{
-    uint32_t list = range->end_list, chunk = range->end_chunk, hidden;
-    for (;;) { // what is hidden has no bytes, and makes room for what follows
-        struct pt_chunk_range found = *range;
-        const int some = pt_next_range(hiding->lists, hiding->count, most, &found);
-        for (hidden = 0; some && list < found.end_list; list++, chunk = 0)
-            hidden += hide(hiding, list, chunk, hiding->lists[list].count);
-        if (some && list < hiding->count) {
-            hidden += hide(hiding, list, chunk, found.end_chunk);
-            chunk = found.end_chunk;
-        }
-        if (!hidden) {
-            *range = found;
-            return some;
-        }
+        hiding->next[i] = c + 1;
     }
+    return 1;
+}
+
+const struct pt_chunk_list *pt_hiding_next(struct pt_hiding *hiding, uint64_t most, uint64_t *bytes)
+{
+    struct pt_chunk_list *round = hiding->rounds[hiding->turn ^= 1];
+    int some = 0, room = 1;
+    *bytes = 0;
+    for (uint32_t i = 0; i < hiding->count; i++) {
+        round[i] = hiding->lists[i];
+        round[i].chunks += hiding->next[i];
+        round[i].count = 0;
+    }
+    while (hiding->depth < PT_DEPTHS) {
+        for (; hiding->list < hiding->count && room; hiding->list += (uint32_t)room)
+            room = take(hiding, hiding->list, most, &round[hiding->list], bytes, &some);
+        if (!room)
+            break;
+        hiding->list = 0;
+        hiding->depth++;
+    }
+    return some ? round : NULL;
 }

@@ -1,22 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// scatter in rounds that begin with what is near: later ones do not read what the keys of those before hide (hidden.h, SPEC 13).
+// scatter in rounds that begin with what is near, whichever list it is of: later ones do not read what the keys of those before hide
+// (hidden.h, SPEC 13).
 #ifndef PT_HIDING_H
 #define PT_HIDING_H
 
+#include "hidden.h"
 #include "plan/rounds.h"
 
 struct pt_hiding {
-    struct pt_chunk_list *lists; // each from near to far
-    struct chunk_view *chunks;   // of all lists; what was found to be hidden has no points, nor slots
-    uint32_t count;
-    const uint64_t *keys; // as they are by now, of planes so wide
-    uint32_t width;
+    struct pt_chunk_list *lists, *rounds[2]; // each list from near to far; what two rounds have of them, by turns
+    struct chunk_view *chunks;               // of all lists
+    uint32_t *next;                          // of each list
+    uint32_t count, depth, list, turn;       // steps nearer than this are done, and of it the lists before this one
+    struct pt_tiles tiles;                   // of keys as they are by now
 };
 
-// Copies the lists and their chunks. 0: there is no memory for it.
-int pt_hiding_begin(struct pt_hiding *hiding, const struct pt_chunk_list *lists, uint32_t count);
+// Copies the lists and their chunks. keys: of planes so wide and high. 0: there is no memory for it.
+int pt_hiding_begin(struct pt_hiding *hiding, const struct pt_chunk_list *lists, uint32_t count, const uint64_t *keys,
+                    uint32_t width, uint32_t height);
 void pt_hiding_end(struct pt_hiding *hiding);
-// As pt_next_range, without what is hidden.
-int pt_hiding_next(const struct pt_hiding *hiding, uint64_t most, struct pt_chunk_range *range);
+// What is next and is not hidden, of all lists: no more bytes than `most`, but one chunk at least; NULL: nothing is. It lasts until the call
+// after the next one.
+const struct pt_chunk_list *pt_hiding_next(struct pt_hiding *hiding, uint64_t most, uint64_t *bytes);
 
 #endif

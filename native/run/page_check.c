@@ -68,8 +68,7 @@ int pt_check_range(const struct pt_check *how, const struct pt_chunk_list *lists
         if (i == range->end_list && !end)
             break; // there may be no such list
         for (uint32_t c = i == range->list ? range->chunk : 0; c < end && !error && lists[i].cloud->page_sums; c++)
-            if (lists[i].chunks[c].padded) // else it is hidden, and not read
-                error = add_page(&pages, lists[i].cloud, pt_page_at(lists[i].cloud, lists[i].chunks[c].first));
+            error = add_page(&pages, lists[i].cloud, pt_page_at(lists[i].cloud, lists[i].chunks[c].first));
     }
     return run(&pages, error, range->bytes);
 }

@@ -15,8 +15,9 @@ enum {
     SHARE = 3,     // of the free memory
     OWN_SHARE = 3, // of OWN_OF parts of a device's own memory: planes need the rest
     OWN_OF = 4,
-    HIDING_STEPS = 16,      // of scatter: later ones leave out what those before them hide
+    HIDING_STEPS = 64,      // of scatter at most: later ones leave out what those before them hide
     HIDING_LEAST = 1 << 20, // bytes a step
+    HIDING_WORTH = 16,      // steps, below which all is read at one go
     HIDING_HOLDS = 2, // times what it reads: the system maps what lies beside it in the file, which is not of the same step
     LEAST = 64 << 20, // bytes, however little is free: less would be read over and over
     ROUNDS_A_CAP = 2, // the last round's pages and this one's
@@ -278,8 +279,6 @@ static void expect(const struct pt_chunk_list *lists, uint32_t count, const stru
         for (uint32_t c = first; c < end;) {
             const struct chunk_view *chunk = &lists[i].chunks[c++];
             uint64_t slots = (uint64_t)chunk->first + chunk->padded;
-            if (!chunk->padded) // hidden
-                continue;
             for (; c < end && lists[i].chunks[c].first == slots && lists[i].chunks[c].cull == chunk->cull; c++)
                 slots += lists[i].chunks[c].padded;
             pt_cloud_expect(lists[i].cloud, lists[i].arrays & ~(chunk->cull ? 0 : lists[i].culled), chunk->first, slots);
@@ -296,40 +295,44 @@ struct bound {
     struct pt_hiding hiding; // no lists: nothing is hidden
 };
 
-// Those that ranges are of.
-static const struct pt_chunk_list *drawn_lists(const struct bound *bound)
-{
-    return bound->hiding.lists ? bound->hiding.lists : bound->lists;
-}
+struct drawn {                         // at a time
+    const struct pt_chunk_list *lists; // the pass's, or all of their own
+    struct pt_chunk_range range;
+};
 
 // Where all fits, the kernel alone leaves out what is hidden: steps take scatter a tenth longer.
 static int hides(const struct pt_pager *pager, const struct pt_pass *pass, uint64_t bytes)
 {
-    return pager->cap && pt_pass_role(pass) == PT_ROLE_KEYS && bytes >= (uint64_t)HIDING_STEPS * HIDING_LEAST;
+    return pager->cap && pt_pass_role(pass) == PT_ROLE_KEYS && bytes >= (uint64_t)HIDING_WORTH * HIDING_LEAST;
 }
 
 static void begin_hiding(const struct pt_pass *pass, struct pt_buffer *const *buffers, uint64_t bytes, struct bound *bound)
 {
-    if (!pt_hiding_begin(&bound->hiding, bound->lists, bound->count))
-        return;
-    bound->most = lesser(bound->most, bytes / HIDING_STEPS);
-    bound->hiding.keys = buffers[pt_pass_keys(pass, &bound->hiding.width)]->data;
+    uint32_t width, height;
+    const uint64_t *keys = buffers[pt_pass_keys(pass, &width, &height)]->data;
+    const uint64_t step = bytes / HIDING_STEPS;
+    if (pt_hiding_begin(&bound->hiding, bound->lists, bound->count, keys, width, height))
+        bound->most = lesser(bound->most, step > HIDING_LEAST ? step : HIDING_LEAST);
 }
 
-static int next_range(const struct bound *bound, struct pt_chunk_range *range)
+// The one after *drawn, which begins as nothing.
+static int next_range(struct bound *bound, struct drawn *drawn)
 {
-    return bound->hiding.lists ? pt_hiding_next(&bound->hiding, bound->most, range)
-                               : pt_next_range(bound->lists, bound->count, bound->most, range);
+    if (!bound->hiding.lists) {
+        drawn->lists = bound->lists;
+        return pt_next_range(bound->lists, bound->count, bound->most, &drawn->range);
+    }
+    drawn->range = (struct pt_chunk_range){.end_list = bound->count};
+    return (drawn->lists = pt_hiding_next(&bound->hiding, bound->most, &drawn->range.bytes)) != NULL;
 }
 
-static int run_range(const struct bound *bound, struct pt_buffer *const *whole, const struct pt_chunk_range *range,
-                     pt_run_bound *run, void *context)
+static int run_range(const struct bound *bound, struct pt_buffer *const *whole, const struct drawn *drawn, pt_run_bound *run,
+                     void *context)
 {
-    const struct pt_chunk_list *lists = drawn_lists(bound);
     for (uint32_t i = 0; i < bound->count; i++) {
-        const struct pt_chunk_list *list = &lists[i];
+        const struct pt_chunk_list *list = &drawn->lists[i];
         uint32_t first, end;
-        part_of(lists, range, i, &first, &end);
+        part_of(drawn->lists, &drawn->range, i, &first, &end);
         bound->parts[i] = *whole[list->ref];
         bound->parts[i].data = (void *)(uintptr_t)(list->chunks + first); // which kernels only read
         bound->parts[i].size = (end - first) * sizeof *list->chunks;
@@ -339,33 +342,32 @@ static int run_range(const struct bound *bound, struct pt_buffer *const *whole, 
 }
 
 // What is damaged of a range: where something is, all others are looked at too, for the picture is planned once more then.
-static int check_range(struct pt_pager *pager, const struct pt_pass *pass, const struct bound *bound,
-                       const struct pt_chunk_range *range)
+static int check_range(struct pt_pager *pager, const struct pt_pass *pass, const struct bound *bound, const struct drawn *drawn)
 {
     const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, NULL, NULL};
-    const int found = pt_check_range(&how, drawn_lists(bound), range);
+    const int found = pt_check_range(&how, drawn->lists, &drawn->range);
     const int more = found == PT_AGAIN ? check_lists(pager, pass, bound->lists, bound->count) : PATINA_OK;
     return more < 0 ? more : found;
 }
 
 // One after another; while one is drawn, the disk reads the next, which the keys of the one before that left open.
-static int run_ranges(struct pt_pager *pager, const struct pt_pass *pass, const struct bound *bound,
-                      struct pt_buffer *const *whole, pt_run_bound *run, void *context)
+static int run_ranges(struct pt_pager *pager, const struct pt_pass *pass, struct bound *bound, struct pt_buffer *const *whole,
+                      pt_run_bound *run, void *context)
 {
-    const struct pt_chunk_list *lists = drawn_lists(bound);
-    struct pt_chunk_range range = {0}, next;
-    int error = PATINA_OK, some = next_range(bound, &range);
-    expect(lists, bound->count, &range);
+    struct drawn drawn = {0}, next;
+    int error = PATINA_OK, some = next_range(bound, &drawn);
+    if (some)
+        expect(drawn.lists, bound->count, &drawn.range);
     while (some && !error) {
-        next = range;
+        next = drawn;
         some = next_range(bound, &next);
         if (some)
-            expect(lists, bound->count, &next);
-        make_room(pager, bound->hiding.lists ? HIDING_HOLDS * range.bytes : range.bytes);
-        error = check_range(pager, pass, bound, &range);
-        error = error ? error : run_range(bound, whole, &range, run, context);
-        pager->read += range.bytes;
-        range = next;
+            expect(next.lists, bound->count, &next.range);
+        make_room(pager, bound->hiding.lists ? HIDING_HOLDS * drawn.range.bytes : drawn.range.bytes);
+        error = check_range(pager, pass, bound, &drawn);
+        error = error ? error : run_range(bound, whole, &drawn, run, context);
+        pager->read += drawn.range.bytes;
+        drawn = next;
     }
     return error;
 }

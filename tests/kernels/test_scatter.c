@@ -482,10 +482,20 @@ static void rows_known(struct harness *h)
     }
 }
 
+enum { WIDTH = 67, HEIGHT = 45 };
+
+// With nothing known of tiles.
+static int is_hidden(const struct chunk_view *chunk, const uint64_t *keys)
+{
+    uint32_t farthest[5 * 3];
+    struct pt_tiles tiles;
+    pt_tiles_begin(keys, WIDTH, HEIGHT, farthest, &tiles);
+    return pt_is_hidden(chunk, &tiles);
+}
+
 // A wall, and behind it, in front of it and through it what may be hidden.
 static void hidden(struct harness *h)
 {
-    enum { WIDTH = 67, HEIGHT = 45 };
     uint64_t *keys = harness_alloc(h, sizeof *keys * WIDTH * HEIGHT);
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
         keys[i] = ref_key(3.0f, 0xFFFFFFFEu);
@@ -493,24 +503,61 @@ static void hidden(struct harness *h)
     const float depths[] = {0.0f, 0x1p-126f, 2.0f, float_step(3.0f, -1), 3.0f, float_step(3.0f, 1), 4.0f, INFINITY};
     for (uint32_t i = 0; i < sizeof depths / sizeof depths[0]; i++) { // of equal depths the numbers decide
         chunk.z_least = depths[i];
-        HARNESS_CHECK(h, pt_is_hidden(&chunk, keys, WIDTH) == (depths[i] > 3.0f));
+        HARNESS_CHECK(h, is_hidden(&chunk, keys) == (depths[i] > 3.0f));
     }
     chunk.z_least = 4.0f;
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) { // a hole of one pixel, and a pixel as far as the chunk
         const uint32_t x = i % WIDTH, y = i / WIDTH, within = x >= 3 && x < 13 && y >= 35;
         for (int way = 0; way < 2; way++) {
             keys[i] = way ? ref_key(4.0f, 0) : REF_EMPTY_KEY;
-            HARNESS_CHECK(h, pt_is_hidden(&chunk, keys, WIDTH) == !within);
+            HARNESS_CHECK(h, is_hidden(&chunk, keys) == !within);
         }
         keys[i] = ref_key(3.0f, 0);
     }
-    chunk.count = 99; // fewer points than pixels
-    HARNESS_CHECK(h, !pt_is_hidden(&chunk, keys, WIDTH));
-    chunk.count = 100;
     chunk.row_first = chunk.row_end = 0; // it does not say where it is
-    HARNESS_CHECK(h, !pt_is_hidden(&chunk, keys, WIDTH));
+    HARNESS_CHECK(h, !is_hidden(&chunk, keys));
     chunk.column_first = chunk.column_end = 0;
-    HARNESS_CHECK(h, !pt_is_hidden(&chunk, keys, WIDTH));
+    HARNESS_CHECK(h, !is_hidden(&chunk, keys));
+}
+
+// Rectangles of any size, whose tiles tell what they found before keys became less: as looking at each pixel says, or that a chunk is open
+// that is hidden only since then.
+static void tiles(struct harness *h)
+{
+    struct rng rng = {26};
+    uint32_t farthest[5 * 3], large = 0, stale = 0;
+    uint64_t *keys = harness_alloc(h, sizeof *keys * WIDTH * HEIGHT);
+    struct pt_tiles known;
+    HARNESS_CHECK(h, pt_tile_count(WIDTH, HEIGHT) == sizeof farthest / sizeof *farthest);
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+        keys[i] = REF_EMPTY_KEY;
+    pt_tiles_begin(keys, WIDTH, HEIGHT, farthest, &known);
+    for (uint32_t k = 0; k < 20000; k++) {
+        const uint32_t x = (uint32_t)rng_range(&rng, 0, WIDTH), y = (uint32_t)rng_range(&rng, 0, HEIGHT);
+        struct chunk_view chunk = {
+            .count = 4096, .column_first = x, .row_first = y, .z_least = (float)rng_range(&rng, 1.0, 9.0)};
+        chunk.column_end = x + 1 + (uint32_t)rng_range(&rng, 0, WIDTH - x);
+        chunk.row_end = y + 1 + (uint32_t)rng_range(&rng, 0, HEIGHT - y);
+        int open = 0;
+        for (uint32_t row = y; row < chunk.row_end; row++)
+            for (uint32_t column = x; column < chunk.column_end; column++)
+                open |= keys[row * WIDTH + column] >= ref_key(chunk.z_least, 0);
+        HARNESS_CHECK(h, is_hidden(&chunk, keys) == !open);
+        HARNESS_CHECK(h, pt_is_hidden(&chunk, &known) == !open);
+        large += !open && (chunk.column_end - x) * (chunk.row_end - y) > 4 * PT_TILE * PT_TILE;
+        for (uint32_t i = 0; i < 8; i++) { // all end at 0.5 to 3
+            const uint32_t pixel = (uint32_t)rng_range(&rng, 0, WIDTH * HEIGHT);
+            const uint64_t key = ref_key((float)rng_range(&rng, k < 10000 ? 3.0 : 0.5, 3.5), k);
+            keys[pixel] = key < keys[pixel] ? key : keys[pixel];
+        }
+        stale += farthest[0] != UINT32_MAX;
+    }
+    HARNESS_CHECK(h, large > 100 && stale > 1000);
+    struct chunk_view far = {
+        .count = 20, .column_end = WIDTH, .row_end = HEIGHT, .z_least = 100.0f}; // fewer points than tiles are worth
+    HARNESS_CHECK(h, !is_hidden(&far, keys));
+    far.count = 60;
+    HARNESS_CHECK(h, is_hidden(&far, keys));
 }
 
 // Dense chunks one behind another that say where they are: keys as of those that do not.
@@ -552,7 +599,7 @@ static void behind_a_wall(struct harness *h)
         for (uint32_t i = 0; i < 67 * 45; i++)
             HARNESS_CHECK(h, known[i] == unknown[i]);
         for (uint32_t c = 4; c < CHUNKS; c++)
-            behind += pt_is_hidden(&cloud->chunks[c], known, 67) != 0;
+            behind += is_hidden(&cloud->chunks[c], known) != 0;
         HARNESS_CHECK(h, behind > (way > 1 ? 0u : CHUNKS / 4));
     }
 }
@@ -601,6 +648,7 @@ int main(int argc, char **argv)
         {"sifted chunks", sifted, 0},
         {"chunks that know their rows", rows_known, 0},
         {"what is hidden", hidden, 1},
+        {"what tiles of keys know", tiles, 1},
         {"chunks behind a wall", behind_a_wall, 0},
         {"nothing to draw", nothing, 0},
     };

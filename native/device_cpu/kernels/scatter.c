@@ -26,6 +26,7 @@ struct scatter {
     struct stripe *stripes; // one a thread, and one of those last
     uint32_t *order;        // chunks by stripes, from near to far; last those across several
     uint32_t *by_depth;     // all of them
+    struct pt_tiles tiles;  // of keys
     atomic_int over;        // a stripe is done
 };
 
@@ -150,7 +151,7 @@ static const struct chunk_view *chunk_at(const struct scatter *scatter, uint32_t
 static void walk_chunk(const struct scatter *scatter, uint32_t c, struct walk *walk)
 {
     const struct chunk_view *chunk = chunk_at(scatter, c, &walk->instance);
-    if (pt_is_hidden(chunk, walk->target.keys, scatter->args->view.width))
+    if (pt_is_hidden(chunk, &scatter->tiles))
         return;
     const float *positions = (const float *)PT_DATA_EACH(scatter->call, scatter, positions, walk->instance) +
                              3 * (size_t)chunk->first;
@@ -280,12 +281,15 @@ int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
         return PATINA_ERROR_MEMORY;
     pt_chunk_begins(call, PT_BUF_scatter_chunks, PT_EACH_scatter, args->instances, scatter.begins);
     const uint32_t chunks = scatter.begins[args->instances];
-    scatter.stripes = pt_cpu_scratch(call, 1,
-                                     (stripes + 1) * sizeof *scatter.stripes + 2 * (size_t)chunks * sizeof *scatter.order);
+    const size_t tiles = pt_tile_count(args->view.width, args->view.height);
+    scatter.stripes = pt_cpu_scratch(
+        call, 1, (stripes + 1) * sizeof *scatter.stripes + (2 * (size_t)chunks + tiles) * sizeof *scatter.order);
     if (!scatter.stripes)
         return PATINA_ERROR_MEMORY;
     scatter.order = (uint32_t *)(void *)(scatter.stripes + stripes + 1);
     scatter.by_depth = scatter.order + chunks;
+    pt_tiles_begin(PT_DATA(call, scatter, keys), args->view.width, args->view.height, scatter.by_depth + chunks,
+                   &scatter.tiles);
     sort_chunks(&scatter, chunks, stripes);
     pt_parallel(call->pool, stripes, 1, scatter_stripes, &scatter);
     for (uint32_t s = 0; s <= stripes; s++)
