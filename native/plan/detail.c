@@ -3,9 +3,16 @@
 
 #include "eye.h"
 #include "ranges.h"
+#include "scene/clusters.h"
 
 // A builder's levels need not be exactly twice as wide as the next: what lies within this of a level is of it.
 #define SAME_LEVEL 1.2
+
+static void take_gaps(struct pt_detail *detail, double finest, double coarsest)
+{
+    detail->coarsest = pt_most(detail->coarsest, coarsest);
+    detail->finest = finest > 0.0 && !(detail->finest > 0.0 && detail->finest <= finest) ? finest : detail->finest;
+}
 
 void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance,
                      struct pt_detail *detail)
@@ -16,12 +23,20 @@ void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *pla
     if (!(scene->settings.detail > 0.0f) || plan->map || scene->settings.surface == PATINA_SURFACE_SPLATS ||
         pt_draws_ranges(scene, instance))
         return;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
-        const double gap = (double)cloud->chunks[c].gap;
-        detail->coarsest = pt_most(detail->coarsest, gap);
-        detail->finest = gap > 0.0 && !(detail->finest > 0.0 && detail->finest <= gap) ? gap : detail->finest;
-    }
+    if (cloud->clusters)
+        for (uint32_t i = 0; i * PT_CLUSTER < cloud->chunk_count; i++)
+            take_gaps(detail, cloud->clusters[i].finest, cloud->clusters[i].coarsest);
+    else
+        for (uint32_t c = 0; c < cloud->chunk_count; c++)
+            take_gaps(detail, (double)cloud->chunks[c].gap, (double)cloud->chunks[c].gap);
     detail->tolerance = detail->coarsest > SAME_LEVEL * detail->finest ? (double)scene->settings.detail : 0.0;
+}
+
+// What the next coarser level leaves open shows no more than the tolerance.
+int pt_detail_leaves_out(const struct pt_detail *detail, double gap, double pixel)
+{
+    return detail->tolerance > 0.0 && gap > 0.0 && 2.0 * gap <= detail->tolerance * pixel &&
+           SAME_LEVEL * gap < detail->coarsest;
 }
 
 int pt_detail_draws(struct pt_detail *detail, const struct pt_chunk *chunk, double pixel, double *thinned)
@@ -30,8 +45,7 @@ int pt_detail_draws(struct pt_detail *detail, const struct pt_chunk *chunk, doub
     *thinned = 1.0;
     if (!(detail->tolerance > 0.0) || !(gap > 0.0))
         return 1;
-    // what the next coarser level leaves open shows no more than the tolerance
-    if (2.0 * gap <= most && SAME_LEVEL * gap < detail->coarsest)
+    if (pt_detail_leaves_out(detail, gap, pixel))
         return 0;
     double finest = detail->finest;
     while (2.0 * finest <= most && SAME_LEVEL * finest < detail->coarsest)

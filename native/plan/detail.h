@@ -19,6 +19,9 @@ void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *pla
 // all of the cloud's the drawn points lie there.
 int pt_detail_draws(struct pt_detail *detail, const struct pt_chunk *chunk, double pixel, double *thinned);
 
+// Whether none of a cluster of chunks is drawn, of which none has a greater gap; its pixel is no wider than theirs.
+int pt_detail_leaves_out(const struct pt_detail *detail, double gap, double pixel);
+
 // How much farther apart than all of the cloud's lie what is drawn of it anywhere: by this much its footprints are widened.
 double pt_detail_thinning(const struct pt_detail *detail);
 

@@ -13,6 +13,7 @@
 #include "lines.h"
 #include "ranges.h"
 #include "scene/clip.h"
+#include "scene/clusters.h"
 #include "base/elementary.h"
 #include "shared/discs.h"
 
@@ -132,6 +133,23 @@ static double stretch_of(const struct pt_eye *camera, const struct pt_extent *ex
 // Pixels beyond the picture that are looked at: whatever the guard will be, the same is seen. It is seldom more.
 enum { AROUND = 160, FARTHEST_FACE = 96 };
 
+// Whether each of a cluster's chunks would be found out of view, or finer than the picture needs. Where the cluster reaches behind the camera and
+// before it, other bounds are looked at than of chunks that do not: nothing follows from these.
+static int is_out(const struct pt_eye *camera, enum pt_kind kind, const struct pt_to_place *what, const double rows[9],
+                  const struct pt_detail *detail, const struct pt_cluster *cluster)
+{
+    double translation[3];
+    struct pt_extent extent;
+    if (!cluster->known)
+        return 0;
+    pt_chunk_translation(camera, what->object, &cluster->around, translation);
+    if (!pt_kind_bounds(camera, kind, what, &cluster->around, rows, translation, &extent))
+        return camera->orthographic || extent.z_beyond < camera->near_clip || extent.z_before >= camera->near_clip;
+    const double before = camera->orthographic ? 1.0 : pt_most(extent.z_before, 0.0);
+    return pt_detail_leaves_out(detail, (double)cluster->around.gap,
+                                pt_most(camera->xs, camera->ys) * before / what->object->scale);
+}
+
 static int look_at_instance(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey, uint32_t i)
 {
     const struct pt_instance *instance = &scene->instances[i];
@@ -155,7 +173,12 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     const double apart = pt_thinning(scene), wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
     double rows[9];
     pt_object_rows(camera, object, rows);
+    const struct pt_cluster *clusters = pt_sieves(&survey->sieves[i]) ? NULL : cloud->clusters; // what clips take is counted
     for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f && !pt_all_soft(instance); c++) {
+        if (clusters && c % PT_CLUSTER == 0 && is_out(camera, kind, &what, rows, &detail, &clusters[c / PT_CLUSTER])) {
+            c += PT_CLUSTER - 1;
+            continue;
+        }
         const struct pt_chunk *chunk = &cloud->chunks[c];
         struct seen seen = {.chunk = c};
         double translation[3], eye[4], angle = 0.0, spread = 0.0;
@@ -354,7 +377,8 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         const double *bounds = seen->extent.rect,
                      around[4] = {bounds[0] - faces, bounds[1] - faces, bounds[2] + faces, bounds[3] + faces};
         uint32_t *rect = out->bounds[out->chunk_count].rect, cells[4];
-        if (seen->wide != (kind != PT_AS_POINTS) || !pt_plan_is_sound(scene, instance->cloud, seen->chunk) ||
+        if (seen->wide != (kind != PT_AS_POINTS) ||
+            !pt_plan_is_sound(scene, instance->cloud, seen->chunk) ||
             !pt_rect_in_window(&plan->view, around, plan->guard, rect))
             continue;
         uint32_t count = pt_drawn_points(scene, chunk);

@@ -3,6 +3,7 @@
 #include "beams.h"
 #include "free_space.h"
 #include "grids.h"
+#include "clusters.h"
 #include "base/compare.h"
 #include "base/descriptor.h"
 #include "base/platform.h"
@@ -516,6 +517,8 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->shapes = analysis->shapes;
     cloud->mapped &= ~(1u << PT_ARRAY_SURFELS | 1u << PT_ARRAY_SHAPES);
     cloud->chunks = analysis->chunks;
+    if (cloud->clusters)
+        pt_clusters_make(cloud);
     cloud->beside = pt_shapes_beside(cloud);
     cloud->spacing_base = analysis->spacing_base;
     *analysis = (struct pt_analysis){0};

@@ -191,8 +191,7 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
 {
     struct pt_division found = {0};
     double linear[9], object[3], origin[3];
-    if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes && !sieve->mask && !sieve->field &&
-        !sieve->hiding_scans)
+    if (!pt_sieves(sieve))
         return PT_WHOLE; // of most scenes all are
     int by_class = sieve->hiding ? hides(sieve->instance->style.hidden_classes, chunk->classes) : 0;
     int by_shape = sieve->hiding_shapes ? hides(sieve->hidden_shapes, chunk->shapes) : 0, kept = !sieve->keeping;

@@ -51,6 +51,12 @@ int pt_is_marked(const struct pt_instance *instance);
 // sees for itself: chunks are not divided by that.
 struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance, enum pt_points points,
                               struct pt_inverse_clip *room);
+// Whether it takes or divides any chunk at all.
+static inline int pt_sieves(const struct pt_sieve *sieve)
+{
+    return sieve->count || sieve->keeping || sieve->hiding || sieve->hiding_shapes || sieve->mask || sieve->field ||
+           sieve->hiding_scans;
+}
 // chunk: one of the cloud's. entries: room for the sieve's clips; may be NULL, as may division. Written where the chunk is divided.
 enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,
                             struct pt_division *division);

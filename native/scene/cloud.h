@@ -73,6 +73,7 @@ struct patina_cloud {
     uint32_t chunk_count;
     uint32_t mapped; // bits 1 << pt_array: of points, pages of a file that nobody ever wrote to
     struct pt_chunk *chunks;
+    struct pt_cluster *clusters;    // of chunks (clusters.h), of a file; NULL: there are none
     struct pt_page_sums *page_sums; // what its arrays in the file sum up to (page_sums.h); NULL: nobody wrote it
     struct pt_paged *paged;         // of a cloud whose points arrive page by page (paged.h), else NULL
     float *positions;               // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin

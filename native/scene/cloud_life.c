@@ -42,6 +42,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_paged_destroy(cloud);
     pt_page_sums_destroy(cloud->page_sums);
     free(cloud->chunks);
+    free(cloud->clusters);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
     pt_alive_release(cloud->alive);
     pt_handle_destroy(&cloud->handle);

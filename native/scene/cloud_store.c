@@ -5,6 +5,7 @@
 #include "analysis.h"
 #include "cloud.h"
 #include "fingerprint.h"
+#include "clusters.h"
 #include "page_sums.h"
 #include "paged.h"
 #include "base/platform.h"
@@ -362,6 +363,8 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
         cloud->mapped |= (uint32_t)(sections[i].size > 0) << i;
     cloud->beside = header.beside != 0;
     code = check_cloud(path, cloud);
+    if (!code)
+        pt_clusters_make(cloud);
     return code ? code : read_pages(path, disk, &header, pages_at(sections), cloud);
 }
 

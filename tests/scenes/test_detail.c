@@ -2,7 +2,8 @@
 // Clouds in levels: pictures that leave finer ones out are closed, near the exact one, and the same on all devices; exact ones draw all
 // (SPEC 13).
 #include "clouds.h"
-#include "scene/cloud.h"
+#include "plan/plan.h"
+#include "scene/clusters.h"
 #include "support.h"
 #include "town.h"
 
@@ -154,6 +155,55 @@ static void test_devices(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// A plan is the same to the bit whether it looks at clusters of chunks first or at each chunk.
+static void test_clusters(void **state)
+{
+    (void)state;
+    struct pcg random = pcg_seed(26);
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_open(path, &cloud), NULL);
+    patina_scene *scene = scene_of(cloud, NULL);
+    struct pt_cluster *clusters = cloud->clusters;
+    assert_non_null(clusters);
+    uint64_t seen = 0, all = 0;
+    for (int i = 0; i < 400; i++) {
+        const double side = ACROSS * TOWN_QUARTER;
+        double eye[3], target[3];
+        for (int k = 0; k < 3; k++) {
+            eye[k] = pcg_between(&random, -0.3, 1.3) * (k < 2 ? side : 20);
+            target[k] = pcg_between(&random, 0, 1) * (k < 2 ? side : 10);
+        }
+        const double fov = pcg_between(&random, 4, 120), near_clip = pcg_between(&random, 0, 1) < 0.5 ? 0.01 : 5;
+        const patina_camera camera = i % 4 ? camera_perspective(eye, target, fov, WIDTH, HEIGHT, near_clip, 150)
+                                           : camera_orthographic(eye, target, fov, WIDTH, HEIGHT, near_clip, 150);
+        patina_settings settings = settings_default(WIDTH, HEIGHT);
+        settings.detail = i % 3 ? (float)pcg_between(&random, 0, 5) : 0.0f;
+        CHECK(patina_scene_set_camera(scene, &camera), scene);
+        CHECK(patina_scene_set_settings(scene, &settings), scene);
+        struct pt_plan plan[2];
+        for (int way = 0; way < 2; way++) {
+            cloud->clusters = way ? NULL : clusters;
+            CHECK(pt_plan_create(scene, &plan[way]), scene);
+        }
+        cloud->clusters = clusters;
+        assert_true(plan[0].chunks_culled == plan[1].chunks_culled && plan[0].spacing_px == plan[1].spacing_px);
+        assert_int_equal(plan[0].instance_count, plan[1].instance_count);
+        for (uint32_t k = 0; k < plan[0].instance_count; k++) {
+            const struct pt_plan_instance *one = &plan[0].instances[k], *other = &plan[1].instances[k];
+            assert_int_equal(one->chunk_count, other->chunk_count);
+            assert_memory_equal(one->chunks, other->chunks, one->chunk_count * sizeof *one->chunks);
+        }
+        seen += plan[0].chunks - plan[0].chunks_culled;
+        all += plan[0].chunks;
+        pt_plan_destroy(&plan[0]);
+        pt_plan_destroy(&plan[1]);
+    }
+    print_message("%.0f %% of the chunks in view\n", 100.0 * (double)seen / (double)all);
+    assert_true(seen > all / 50 && seen < all / 2);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 static void test_refused(void **state)
 {
     (void)state;
@@ -170,6 +220,6 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_errors), cmocka_unit_test(test_devices),
-                                       cmocka_unit_test(test_refused)};
+                                       cmocka_unit_test(test_clusters), cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, make_file, remove_file);
 }
