@@ -105,6 +105,9 @@ void pt_chunk_translation(const struct pt_eye *camera, const struct pt_object *o
     translation[1] = sy * view[1] + oy * (camera->orthographic ? 1.0 : translation[2]);
 }
 
+// Of z, from which on a reach may come to many pixels.
+#define NEAR_REACH 0.01
+
 // Whether a box lies beyond one side of the view, its part behind the camera too, where the screen bounds nothing. q: of its
 // corners, screen X and Y times z, and z, each off by `error` at most. A pixel narrower than exact.
 static int lies_beside(const struct pt_eye *camera, double q[3][8], const double error[3], double reach)
@@ -156,6 +159,7 @@ int pt_chunk_bounds(const struct pt_eye *camera, const struct pt_chunk *chunk, c
             rect[2 + k] = pt_most(at + 1.0, rect[2 + k]);
         }
     }
+    out->beside = 0;
     slop = 1e-5 * (fabs(z_min) + fabs(z_max)) + error[2];
     out->z_middle = 0.5 * (pt_most(z_min, z_near) + pt_most(z_max, z_near));
     out->z_beyond = z_max + slop + reach;
@@ -185,6 +189,8 @@ int pt_chunk_bounds(const struct pt_eye *camera, const struct pt_chunk *chunk, c
         rect[2] = rect[3] = INFINITY;
         return !lies_beside(camera, q, error, reach);
     }
+    // the bounds of wide discs right before the camera are wide
+    out->beside = !camera->orthographic && reach > NEAR_REACH * nearest_z && lies_beside(camera, q, error, reach);
     // what is not a number bounds nothing
     return !(rect[0] >= camera->width || rect[1] >= camera->height || rect[2] <= 0.0 || rect[3] <= 0.0);
 }

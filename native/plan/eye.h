@@ -22,6 +22,7 @@ struct pt_extent {
     double z_middle, z_beyond; // of its part before the eye; nothing lies beyond
     double z_before;           // nothing lies before
     double share;              // how much of it lies before the eye
+    int beside;                // it is bounded by some of the screen, but lies beside it
 };
 
 struct pt_object {

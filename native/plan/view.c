@@ -377,7 +377,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         const double *bounds = seen->extent.rect,
                      around[4] = {bounds[0] - faces, bounds[1] - faces, bounds[2] + faces, bounds[3] + faces};
         uint32_t *rect = out->bounds[out->chunk_count].rect, cells[4];
-        if (seen->wide != (kind != PT_AS_POINTS) ||
+        if (seen->wide != (kind != PT_AS_POINTS) || (seen->extent.beside && !range) ||
             !pt_plan_is_sound(scene, instance->cloud, seen->chunk) ||
             !pt_rect_in_window(&plan->view, around, plan->guard, rect))
             continue;
