@@ -22,7 +22,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 QUARTER, STOREY = 40.0, 3.0  # metres: tests/scenes/town.h
 SIZE, CAPS, ROUNDS = "1920x1080", ("100G", "500M"), 3
-LEVELS, DETAILS = 5, (4.0, 1.0, 0.0)  # pixels between points; 0: all points
+LEVELS_CAP, DETAILS = "2G", (4.0, 1.0, 0.0)  # pixels between points; 0: all points
+QUARTER_POINTS, COARSEST = 1000000, 1 << 16
 
 
 @dataclass
@@ -39,6 +40,14 @@ def looks(across: int) -> dict[str, str]:
     ground = STOREY * (across // 2)
     return {"overview": f"{-0.4 * side},{-0.75 * side},{0.75 * side},{side / 2},{side / 2},{STOREY * across / 2},40",
             "close-up": f"{middle + 2},{middle - 14},{ground + 6},{middle + 14},{middle + 10},{ground + 3},50"}
+
+
+def levels(across: int) -> int:
+    """As many as the builder leaves a cloud in (SPEC 13)."""
+    count = 1
+    while across ** 2 * QUARTER_POINTS >> 2 * (count - 1) > COARSEST:
+        count += 1
+    return count
 
 
 def forget(path: Path) -> None:
@@ -84,20 +93,20 @@ def rows_of(patina: Path, cloud: Path, across: int) -> list[str]:
 
 def measure_levels(sizes: tuple[int, ...], library: Path, folder: Path | None = None) -> str:
     patina, town = library.parent / "patina", library.parent / "tests/bench/town"
-    rows = ["| points | view | pixels between points | cold, ms | warm, ms | peak memory, MB | asked by passes over points, MB | of the file | read of the disk, MB |",
-            "|---|---|---|---|---|---|---|---|---|"]
+    rows = ["| points | view | pixels between points | cold, ms | warm, ms | peak memory, MB | rounds | asked by passes over points, MB | of the file | read of the disk, MB |",
+            "|---|---|---|---|---|---|---|---|---|---|"]
     for across in sizes:
         with tempfile.TemporaryDirectory(dir=folder) as temporary:
             cloud = Path(temporary) / "town.cloud"
-            subprocess.run([town, cloud, str(across), "1000000", str(LEVELS)], check=True, capture_output=True)
+            subprocess.run([town, cloud, str(across), str(QUARTER_POINTS), str(levels(across))], check=True, capture_output=True)
             for view, look in looks(across).items():
                 for detail in DETAILS:
                     forget(cloud)
-                    cold = draw(patina, cloud, look, CAPS[0], detail)
-                    warm = [draw(patina, cloud, look, CAPS[0], detail) for _ in range(ROUNDS)]
+                    cold = draw(patina, cloud, look, LEVELS_CAP, detail)
+                    warm = [draw(patina, cloud, look, LEVELS_CAP, detail) for _ in range(ROUNDS)]
                     read = cold.mapped["read"]
                     rows.append(f"| {across**2},000,000 | {view} | {detail:.0f} | {cold.ms:.0f} | {statistics.median(run.ms for run in warm):.0f} | "
-                                f"{max(run.peak for run in (cold, *warm)):.0f} | {1e-6 * read:.1f} | {read / cloud.stat().st_size:.2%} | {cold.disk:.0f} |")
+                                f"{max(run.peak for run in (cold, *warm)):.0f} | {cold.mapped['rounds']} | {1e-6 * read:.1f} | {read / cloud.stat().st_size:.2%} | {cold.disk:.0f} |")
                     print(rows[-1], file=sys.stderr)
     return "\n".join(rows)
 
