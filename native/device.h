@@ -46,6 +46,7 @@ struct pt_buffer {
     uint32_t name;    // GL device: buffer object
     uint32_t wrapped; // CPU device: data belongs to somebody else
     size_t clean[2];  // keys: bytes at its beginning and at its end that are empty
+    uint32_t each;    // bytes a slot of a cloud's positions; 0: they are floats
     size_t wanted;    // bytes that it lacks to be large enough for a kernel that answered PT_MORE_ROOM
     const void
         *source; // GL device: what was lent for it, as long as that lives; of PT_IN_RANGES all there is of it, and name is 0

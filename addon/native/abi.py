@@ -87,7 +87,8 @@ class CloudInfo(Descriptor):
                 ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float), ("has_scalars", c_uint32),
                 ("has_classes", c_uint32), ("scalar_range", c_float * 2), ("class_bits", c_uint32 * 8),
                 ("has_shapes", c_uint32), ("normals_oriented", c_uint32), ("estimated_normals", c_uint64),
-                ("kinds", c_uint64 * 6), ("seen_through", c_uint64)]
+                ("kinds", c_uint64 * 6), ("seen_through", c_uint64), ("packed", c_uint32), ("numbered", c_uint32),
+                ("packed_error", c_double)]
 
 
 class AnalysisDesc(Descriptor):
@@ -102,6 +103,10 @@ class Neighbourhoods(Descriptor):
                 ("half_axes", c_void_p), ("sigma", c_void_p), ("kind", c_void_p), ("certainty", c_void_p),
                 ("seen_through", c_void_p), ("neighbours", c_uint32), ("threads", c_uint32), ("numbers", c_void_p),
                 ("distances", c_void_p), ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
+
+
+class SaveDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("pack", c_uint32), ("drop_order", c_uint32)]
 
 
 class CloudStyle(Descriptor):
@@ -317,6 +322,7 @@ CALLS = {
     "patina_cloud_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p),
     "patina_cloud_neighbourhoods": (c_void_p, POINTER(Neighbourhoods), c_void_p),
     "patina_cloud_save": (c_void_p, c_char_p),
+    "patina_cloud_save_as": (c_void_p, c_char_p, POINTER(SaveDesc)),
     "patina_cloud_open": (c_char_p, POINTER(c_void_p)),
     "patina_cloud_verify": (c_char_p, c_void_p),
     "patina_cloud_get_info": (c_void_p, POINTER(CloudInfo)),

@@ -233,11 +233,12 @@ static void set_bit(uint8_t *bits, uint32_t index) // from several threads
 static void pick_chunk(const struct pick *pick, const struct pt_chunk *chunk, const struct pt_division *division)
 {
     const struct patina_cloud *cloud = pick->instance->cloud;
-    const float *positions = cloud->positions + 3 * (size_t)chunk->first;
+    float unpacked[3 * PT_CHUNK_POINTS];
     double world[3], offset[3];
     chunk_offset(pick, chunk, world, offset);
     if (pick->outline.count && !may_have(pick, chunk, offset))
         return;
+    const float *positions = pt_chunk_positions(cloud, chunk, unpacked);
     for (uint32_t i = 0; i < chunk->count; i++) {
         const double p[3] = {(double)positions[i], (double)positions[chunk->padded + i],
                              (double)positions[2 * (size_t)chunk->padded + i]};

@@ -4,13 +4,48 @@
 #define PT_POINTS_H
 
 #include "device_cpu/vector_math.h"
+#include "shared/packed.h"
 #include "shared/view.h"
 
-// Points from slot i of the chunk on, relative to its origin; positions: the chunk's first.
-static inline void pt_load_points(const float *positions, uint32_t padded, uint32_t i, vf p[3])
+// What places a chunk's points, of what places its cloud's: three words each, or two where they are packed (struct chunk_view).
+static inline const uint32_t *pt_chunk_points(const void *positions, const struct chunk_view *chunk)
 {
+    return (const uint32_t *)positions + (size_t)(chunk->step > 0.0f ? PT_PACKED_WORDS : PT_POSITION_WORDS) * chunk->first;
+}
+
+static inline vf pt_unpack(vi q, float step) { return (vi_convert(q) - vf_set((float)PT_PACKED_MIDDLE)) * vf_set(step); }
+
+// Points from slot i of the chunk on, relative to its origin; points: pt_chunk_points. packed: as its step says, where a loop is written
+// once for each.
+static inline void pt_load_points_as(int packed, const struct chunk_view *chunk, const uint32_t *points, uint32_t i, vf p[3])
+{
+    const uint32_t *at = points + i;
+    if (packed) {
+        const vi low = vi_load(at), high = vi_load(at + chunk->padded), mask = vi_set(PT_PACKED_MASK);
+        p[0] = pt_unpack(vi_and(low, mask), chunk->step);
+        p[1] = pt_unpack(vi_and(high, mask), chunk->step);
+        p[2] = pt_unpack(vi_or(vi_shr(low, PT_PACKED_BITS), vi_and(vi_shr(high, 10), vi_set(PT_PACKED_HIGH))), chunk->step);
+        return;
+    }
     for (uint32_t k = 0; k < 3; k++)
-        p[k] = vf_load(positions + k * (size_t)padded + i);
+        p[k] = vi_float(vi_load(at + k * (size_t)chunk->padded));
+}
+
+static inline void pt_load_points(const struct chunk_view *chunk, const uint32_t *points, uint32_t i, vf p[3])
+{
+    pt_load_points_as(chunk->step > 0.0f, chunk, points, i, p);
+}
+
+// The point in slot i alone.
+static inline void pt_load_point(const struct chunk_view *chunk, const uint32_t *points, uint32_t i, float p[3])
+{
+    const uint32_t *at = points + i;
+    if (chunk->step > 0.0f) {
+        pt_packed_point(at[0], at[chunk->padded], chunk->step, p);
+        return;
+    }
+    for (uint32_t k = 0; k < 3; k++)
+        p[k] = pt_float(at[k * (size_t)chunk->padded]);
 }
 
 // Row 0, 1 or 2 of points as the view sees their chunk: see struct chunk_view.

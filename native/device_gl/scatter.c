@@ -4,6 +4,7 @@
 // center, average: one instance.
 #include "device_gl.h"
 #include "shared/measured.h"
+#include "shared/packed.h"
 #include "shared/points.h"
 
 #include <stdio.h>
@@ -42,14 +43,21 @@ enum { CHUNKS, POSITIONS }; // of an instance's buffers
 enum { LARGE = 3 };         // programs of discs: those of large ones follow
 
 static const struct pt_buffer *chunks_of(const struct instance_buffers *b) { return b->buffers[CHUNKS]; }
-static uint64_t slots_of(const struct instance_buffers *b) { return b->buffers[POSITIONS]->size / 12; }
+
+static size_t position_bytes(const struct instance_buffers *b)
+{
+    const uint32_t packed = b->buffers[POSITIONS]->each;
+    return packed ? packed : 4 * PT_POSITION_WORDS;
+}
+
+static uint64_t slots_of(const struct instance_buffers *b) { return b->buffers[POSITIONS]->size / position_bytes(b); }
 
 // Bytes a slot; 0: it is not bound in parts.
 static size_t bytes_of(const struct instance_buffers *b, uint32_t k)
 {
     if (!pt_gl_is_part(b->work, &b->rows[k]))
         return 0;
-    return k == POSITIONS ? 12 : b->buffers[k] ? b->buffers[k]->size / slots_of(b) : 0;
+    return k == POSITIONS ? position_bytes(b) : b->buffers[k] ? b->buffers[k]->size / slots_of(b) : 0;
 }
 
 // Some of what its points have does; here: some does not.
@@ -170,10 +178,11 @@ static int run_part(struct pt_gl_device *d, const struct instance_buffers *b, co
     return result;
 }
 
-// That fit into a block, and a texture.
+// That fit into a block, and a texture of words; packed ones would fit as well.
 static uint64_t most_slots(const struct pt_gl_device *d)
 {
-    return d->block_size / 12 < d->texels / 3 ? d->block_size / 12 : d->texels / 3;
+    const uint64_t in_block = d->block_size / (4 * PT_POSITION_WORDS), in_texture = d->texels / PT_POSITION_WORDS;
+    return in_block < in_texture ? in_block : in_texture;
 }
 
 // How many slots a part has at most, and what its first is a multiple of.

@@ -239,6 +239,7 @@ void pt_set_chunk(const struct pt_eye *camera, const struct pt_object *object, c
     out->padded = chunk->padded;
     out->cull = cull;
     out->id_base = instance->id_base;
+    out->step = instance->cloud && instance->cloud->packed ? pt_chunk_step(chunk) : 0.0f;
 }
 
 #define LARGEST_LAYER 1e30f

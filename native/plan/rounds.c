@@ -54,7 +54,7 @@ static uint32_t array_bit(enum pt_instance_buffer which, const struct patina_clo
 static uint32_t copied_of(uint32_t which, const struct patina_cloud *cloud)
 {
     switch (which) {
-    case PT_POSITIONS: return 12;
+    case PT_POSITIONS: return 4 * pt_position_words(cloud);
     case PT_SURFELS:
     case PT_FIELD:
     case PT_FIELD_ONE: return 4;

@@ -91,7 +91,7 @@ static int upload_all(struct patina_device *device, const struct patina_cloud *c
         const void *data;
         size_t size;
     } parts[] = {
-        {PT_POSITIONS, cloud->positions, cloud->slots * 12},
+        {PT_POSITIONS, cloud->positions, cloud->slots * 4 * pt_position_words(cloud)},
         {PT_OPACITIES, cloud->opacities, cloud->slots},
         {PT_CLASSES, cloud->classes, cloud->slots},
     };
@@ -102,6 +102,7 @@ static int upload_all(struct patina_device *device, const struct patina_cloud *c
         if (error)
             return error;
     }
+    resident->buffers[PT_POSITIONS].each = 4 * pt_position_words(cloud);
     resident->pages = atomic_load(&cloud->alive->pages);
     error = upload_shapes(device, cloud, resident);
     if (!error)

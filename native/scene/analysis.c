@@ -145,9 +145,7 @@ static int orient(const struct pt_beam *beam, const double p[3], uint32_t given,
 // The beam that took a point, and where that lies; NULL where no station is known.
 static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_chunk *chunk, uint32_t slot, double p[3])
 {
-    for (uint32_t k = 0; k < 3; k++)
-        p[k] = chunk->origin[k] +
-               (double)walk->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + slot - chunk->first];
+    pt_point_place(walk->cloud, chunk, slot - chunk->first, p);
     return walk->beams.count ? &walk->beams.each[pt_station_of(walk->desc, pt_number_of(walk->cloud, slot), p)] : NULL;
 }
 

@@ -314,7 +314,7 @@ static void fill_chunk(struct build *build, struct pt_chunk *chunk, const uint64
     uint32_t *order = cloud->order + chunk->first;
     float *axis[3];
     for (int k = 0; k < 3; k++)
-        axis[k] = cloud->positions + 3 * (size_t)chunk->first + (size_t)k * chunk->padded;
+        axis[k] = (float *)cloud->positions + 3 * (size_t)chunk->first + (size_t)k * chunk->padded;
     stratify(words, chunk->count, order);
 
     double box_min[3], box_max[3], p[3];

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/pool.h"
+#include "shared/packed.h"
 #include "sights.h"
 
 #include <stdatomic.h>
@@ -71,15 +72,18 @@ struct patina_cloud {
     struct pt_alive *alive;
     uint64_t slots; // padded points
     uint32_t chunk_count;
-    uint32_t mapped; // bits 1 << pt_array: of points, pages of a file that nobody ever wrote to
+    uint32_t mapped;  // bits 1 << pt_array: of points, pages of a file that nobody ever wrote to
+    int packed;       // positions are, all of them (packed.h)
+    int unordered;    // points are numbered as they lie: there is no order, but ...
+    uint32_t *begins; // ... the number of each chunk's first point, and behind them of all
     struct pt_chunk *chunks;
     struct pt_cluster *clusters;    // of chunks (clusters.h), of a file; NULL: there are none
     struct pt_page_sums *page_sums; // what its arrays in the file sum up to (page_sums.h); NULL: nobody wrote it
     struct pt_paged *paged;         // of a cloud whose points arrive page by page (paged.h), else NULL
-    float *positions;               // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
-    uint32_t *order;                // slots: index in the caller's arrays
-    uint32_t *surfels;              // slots: octahedral normal and spacing class (shared/words.h)
-    int beside;                     // pt_shapes_beside; files keep it
+    void *positions; // words, by chunk (struct chunk_view): 3 * slots floats, relative to the chunk's origin; packed: 2 * slots
+    uint32_t *order; // slots: index in the caller's arrays; NULL: see begins
+    uint32_t *surfels;  // slots: octahedral normal and spacing class (shared/words.h)
+    int beside;         // pt_shapes_beside; files keep it
     uint32_t *shapes;   // slots: footprint, thickness, kind (shared/words.h), or NULL where the cloud was not analysed
     void *colors;       // slots x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // slots, or NULL where every point is opaque
@@ -94,10 +98,33 @@ struct patina_cloud {
     double spacing_base;     // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
 
+// ---- where points are (positions.c) ----------------------------------------------------------------------------------------
+
+// Of packed positions: the least power of two whose steps reach over the chunk's box. It is that of the box of what was packed by it,
+// too: rounding moves no coordinate from above half the reach to below it.
+float pt_chunk_step(const struct pt_chunk *chunk);
+static inline uint32_t pt_position_words(const struct patina_cloud *cloud) // of a slot
+{
+    return cloud->packed ? PT_PACKED_WORDS : PT_POSITION_WORDS;
+}
+// x, y, z [padded] of a chunk, relative to its origin: where they lie, or in `scratch`, which has room for 3 * padded.
+const float *pt_chunk_positions(const struct patina_cloud *cloud, const struct pt_chunk *chunk, float *scratch);
+// Point i of a chunk, relative to its origin, and in object units.
+void pt_point_offset(const struct patina_cloud *cloud, const struct pt_chunk *chunk, uint32_t i, float p[3]);
+void pt_point_place(const struct patina_cloud *cloud, const struct pt_chunk *chunk, uint32_t i, double p[3]);
+// Packs the chunk's points, x, y, z [padded], into 2 * padded words, and rounds its box likewise. Returns how far one is moved at most.
+double pt_chunk_pack(struct pt_chunk *chunk, const float *positions, uint32_t *words);
+
+// How many points lie before that in a slot, where the cloud is unordered; padding is what it repeats.
+uint32_t pt_place_of(const struct patina_cloud *cloud, uint64_t slot);
+int pt_cloud_count_places(struct patina_cloud *cloud);  // makes `begins`. 0 or PATINA_ERROR_MEMORY
+int pt_is_as_it_lies(const struct patina_cloud *cloud); // whether its order says nothing else
+
 // The caller's number of the point in a slot. That of a damaged file, whose points nobody looked through, leads beyond no array.
 static inline uint32_t pt_number_of(const struct patina_cloud *cloud, uint64_t slot)
 {
-    const uint32_t number = cloud->order[slot], last = (uint32_t)cloud->info.count - 1;
+    const uint32_t number = cloud->order ? cloud->order[slot] : pt_place_of(cloud, slot),
+                   last = (uint32_t)cloud->info.count - 1;
     return number < last ? number : last;
 }
 
@@ -142,6 +169,7 @@ void pt_cloud_sections(struct patina_cloud *cloud, struct pt_section sections[PT
 uint64_t pt_cloud_mapped_bytes(const struct patina_cloud *cloud);
 uint64_t pt_cloud_copied_bytes(const struct patina_cloud *cloud);  // of what its points have, wherever it lies
 uint32_t pt_cloud_largest_chunk(const struct patina_cloud *cloud); // slots
+uint32_t pt_cloud_array_bytes(const struct patina_cloud *cloud, enum pt_array array); // of a point, where the cloud has it
 uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array); // of a point in the file; 0: not mapped
 // No page of the file is held any longer than until it is read again; any thread, whoever reads.
 void pt_cloud_return(const struct patina_cloud *cloud);

@@ -41,6 +41,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_sights_free(&cloud->sights);
     pt_paged_destroy(cloud);
     pt_page_sums_destroy(cloud->page_sums);
+    free(cloud->begins);
     free(cloud->chunks);
     free(cloud->clusters);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render

@@ -10,8 +10,8 @@ void pt_cloud_sections(struct patina_cloud *cloud, struct pt_section sections[PT
     const uint64_t slots = cloud->slots;
     const struct pt_section list[PT_ARRAYS] = {
         [PT_ARRAY_CHUNKS] = {(void **)&cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks},
-        [PT_ARRAY_POSITIONS] = {(void **)&cloud->positions, slots * 12},
-        [PT_ARRAY_ORDER] = {(void **)&cloud->order, slots * 4},
+        [PT_ARRAY_POSITIONS] = {&cloud->positions, slots * 4 * pt_position_words(cloud)},
+        [PT_ARRAY_ORDER] = {(void **)&cloud->order, cloud->unordered ? 0 : slots * 4},
         [PT_ARRAY_SURFELS] = {(void **)&cloud->surfels, slots * 4},
         [PT_ARRAY_COLORS] = {&cloud->colors, cloud->color_format ? slots * pt_color_size(cloud->color_format) + 4 : 0},
         [PT_ARRAY_OPACITIES] = {(void **)&cloud->opacities, cloud->info.has_opacities ? slots + 4 : 0},
@@ -62,14 +62,19 @@ uint32_t pt_cloud_largest_chunk(const struct patina_cloud *cloud)
     return most;
 }
 
-uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array)
+uint32_t pt_cloud_array_bytes(const struct patina_cloud *cloud, enum pt_array array)
 {
     static const uint8_t bytes[PT_ARRAYS] = {
-        [PT_ARRAY_POSITIONS] = 12, [PT_ARRAY_ORDER] = 4,   [PT_ARRAY_SURFELS] = 4, [PT_ARRAY_OPACITIES] = 1,
-        [PT_ARRAY_RADII] = 4,      [PT_ARRAY_SCALARS] = 4, [PT_ARRAY_CLASSES] = 1, [PT_ARRAY_SHAPES] = 4};
-    if (!(cloud->mapped >> array & 1u))
-        return 0;
-    return array == PT_ARRAY_COLORS ? (uint32_t)pt_color_size(cloud->color_format) : bytes[array];
+        [PT_ARRAY_ORDER] = 4,   [PT_ARRAY_SURFELS] = 4, [PT_ARRAY_OPACITIES] = 1, [PT_ARRAY_RADII] = 4,
+        [PT_ARRAY_SCALARS] = 4, [PT_ARRAY_CLASSES] = 1, [PT_ARRAY_SHAPES] = 4};
+    return array == PT_ARRAY_COLORS      ? (uint32_t)pt_color_size(cloud->color_format)
+           : array == PT_ARRAY_POSITIONS ? 4 * pt_position_words(cloud)
+                                         : bytes[array];
+}
+
+uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array)
+{
+    return cloud->mapped >> array & 1u ? pt_cloud_array_bytes(cloud, array) : 0;
 }
 
 void pt_cloud_return(const struct patina_cloud *cloud)

@@ -8,6 +8,7 @@
 #include "clusters.h"
 #include "page_sums.h"
 #include "paged.h"
+#include "base/descriptor.h"
 #include "base/platform.h"
 #include "base/progress.h"
 
@@ -17,8 +18,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Files of the version before have no sums of pages.
-enum { SECTION = 1 << 16, VERSION = 11, WITHOUT_PAGES = 10, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
+// Files of version 11 are neither packed nor without order, those of 10 have no sums of pages either.
+enum { SECTION = 1 << 16, VERSION = 12, UNPACKED = 11, WITHOUT_PAGES = 10, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
+enum { INFO_BYTES = offsetof(patina_cloud_info, packed) }; // of what a cloud tells; the header has the rest
 static const char magic[8] = {'p', 'a', 't', 'i', 'n', 'a', '\n', '\x1a'};
 
 struct header {
@@ -29,17 +31,33 @@ struct header {
     uint64_t class_hash;
     uint64_t sight_count, sight_room, sight_bytes; // of stations, and what they saw
     uint64_t beside;                               // the cloud's
-    patina_cloud_info info;
+    uint64_t info[INFO_BYTES / 8];
     uint64_t sums[SECTIONS]; // of what each section holds, see sum_of
-    uint64_t check;          // of all before it, the chunks, and page_sum
-    uint64_t page_sum;       // of the sums of pages, which lie behind the last section
+    uint64_t check;          // of all before it, the chunks, and the tail
+    uint64_t page_sum;       // the tail: of the sums of pages, which lie behind the last section
+    double packed_error;
+    uint32_t packed, unordered;
 };
+_Static_assert(INFO_BYTES % 8 == 0 && sizeof(struct header) == offsetof(struct header, page_sum) + 24, "a header has no holes");
+
+static size_t tail_size(const struct header *header)
+{
+    return header->version == WITHOUT_PAGES ? 0
+           : header->version == UNPACKED    ? sizeof header->page_sum
+                                            : sizeof *header - offsetof(struct header, page_sum);
+}
+
+// Behind what its first part sums up to.
+static uint64_t add_tail(uint64_t hash, const struct header *header)
+{
+    const size_t size = tail_size(header);
+    return size ? pt_fingerprint(hash, &header->page_sum, size) : hash;
+}
 
 static uint64_t check_of(const struct header *header, const struct pt_chunk *chunks)
 {
     uint64_t hash = pt_fingerprint(header->version, header, offsetof(struct header, check));
-    hash = pt_fingerprint(hash, chunks, header->chunk_count * sizeof *chunks);
-    return header->version == WITHOUT_PAGES ? hash : pt_fingerprint(hash, &header->page_sum, sizeof header->page_sum);
+    return add_tail(pt_fingerprint(hash, chunks, header->chunk_count * sizeof *chunks), header);
 }
 
 // Piece by piece, so that a file need not be in memory whole to be compared.
@@ -165,11 +183,15 @@ static void fill_header(struct header *header, const struct patina_cloud *cloud)
     header->sight_bytes = cloud->sights.bytes;
     struct patina_cloud copy = *cloud;
     struct pt_section sections[SECTIONS];
-    header->info = cloud->info;
-    header->info.bytes = 0; // of the arrays, wherever they lie just now
+    copy.info.struct_size = INFO_BYTES;
+    copy.info.bytes = 0; // of the arrays, wherever they lie just now
     pt_cloud_sections(&copy, sections);
     for (int i = 0; i < SECTIONS; i++)
-        header->info.bytes += sections[i].size;
+        copy.info.bytes += sections[i].size;
+    memcpy(header->info, &copy.info, sizeof header->info);
+    header->packed_error = cloud->info.packed_error;
+    header->packed = cloud->packed != 0;
+    header->unordered = cloud->unordered != 0;
     header->check = check_of(header, cloud->chunks);
 }
 
@@ -209,34 +231,120 @@ void pt_cloud_writer_drop(struct pt_cloud_writer *writer)
     free(writer);
 }
 
-static int save(const patina_cloud *cloud, const char *path)
+enum { HELD = 1 << 26 }; // bytes of a mapped cloud that are read before their pages are given back
+
+static void look(const struct patina_cloud *cloud, uint64_t *read, uint64_t bytes)
 {
-    struct patina_cloud copy = *cloud;
-    struct pt_section sections[SECTIONS];
-    struct pt_cloud_writer *writer;
-    pt_cloud_sections(&copy, sections);
-    const int error = pt_cloud_writer_begin(path, cloud, &writer);
-    if (error)
-        return error;
-    for (int i = 0; i < SECTIONS; i++)
-        pt_cloud_writer_add(writer, (enum pt_array)i, *sections[i].data, sections[i].size);
-    return pt_cloud_writer_end(writer, cloud);
+    *read += bytes;
+    if (*read < HELD || !cloud->mapped)
+        return;
+    pt_cloud_return(cloud);
+    *read = 0;
 }
 
-int patina_cloud_save(const patina_cloud *cloud, const char *path)
+static void add_array(struct pt_cloud_writer *writer, const struct patina_cloud *cloud, enum pt_array array,
+                      const struct pt_section *section, uint64_t *read)
 {
+    for (uint64_t at = 0; at < section->size; at += PIECE) {
+        const uint64_t some = section->size - at < PIECE ? section->size - at : PIECE;
+        pt_cloud_writer_add(writer, array, (const char *)*section->data + at, some);
+        look(cloud, read, some);
+    }
+}
+
+// Chunk by chunk; the boxes of those of `out` are rounded as their points are.
+static void add_packed(struct pt_cloud_writer *writer, const struct patina_cloud *cloud, struct patina_cloud *out,
+                       uint32_t *words, uint64_t *read)
+{
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        struct pt_chunk *chunk = &out->chunks[c];
+        const float *positions = (const float *)cloud->positions + 3 * (size_t)chunk->first;
+        const double moved = pt_chunk_pack(chunk, positions, words);
+        out->info.packed_error = moved > out->info.packed_error ? moved : out->info.packed_error;
+        pt_cloud_writer_add(writer, PT_ARRAY_POSITIONS, words, (uint64_t)chunk->padded * 4 * PT_PACKED_WORDS);
+        look(cloud, read, (uint64_t)chunk->padded * 4 * PT_POSITION_WORDS);
+        for (int k = 0; k < 3; k++) {
+            const double low = chunk->origin[k] + (double)chunk->box_min[k],
+                         high = chunk->origin[k] + (double)chunk->box_max[k];
+            out->info.box_min[k] = c && out->info.box_min[k] < low ? out->info.box_min[k] : low;
+            out->info.box_max[k] = c && out->info.box_max[k] > high ? out->info.box_max[k] : high;
+        }
+    }
+}
+
+// out: what is written: the cloud, or of it what is said otherwise, with chunks of its own where it is packed now.
+static int save(const patina_cloud *cloud, const char *path, struct patina_cloud *out)
+{
+    const int packs = out->packed && !cloud->packed;
+    struct patina_cloud copy = *out;
+    struct pt_section sections[SECTIONS];
+    struct pt_cloud_writer *writer;
+    uint32_t *words = packs ? malloc((size_t)pt_cloud_largest_chunk(cloud) * 4 * PT_PACKED_WORDS + 1) : NULL;
+    uint64_t read = 0;
+    if (packs && !words)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    pt_cloud_sections(&copy, sections);
+    const int error = pt_cloud_writer_begin(path, out, &writer);
+    for (int i = PT_ARRAY_POSITIONS; i < SECTIONS && !error; i++)
+        if (packs && i == PT_ARRAY_POSITIONS)
+            add_packed(writer, cloud, out, words, &read);
+        else
+            add_array(writer, cloud, (enum pt_array)i, &sections[i], &read);
+    free(words);
+    if (error)
+        return error;
+    pt_cloud_writer_add(writer, PT_ARRAY_CHUNKS, out->chunks, sections[PT_ARRAY_CHUNKS].size);
+    return pt_cloud_writer_end(writer, out);
+}
+
+static int save_packed(const patina_cloud *cloud, const char *path, struct patina_cloud *out)
+{
+    const size_t size = cloud->chunk_count * sizeof *cloud->chunks;
+    struct pt_chunk *chunks = malloc(size + 1);
+    if (!chunks)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    if (size)
+        memcpy(chunks, cloud->chunks, size);
+    out->chunks = chunks;
+    out->packed = 1;
+    const int error = save(cloud, path, out);
+    free(chunks);
+    if (!error)
+        pt_log(PT_LOG_INFO, "%s: packed positions lie at most %.3g from where they were given", path, out->info.packed_error);
+    return error;
+}
+
+static int save_as(const patina_cloud *cloud, const char *path, const patina_save_desc *desc)
+{
+    struct patina_cloud out = *cloud;
+    if (desc->drop_order || (desc->pack && pt_is_as_it_lies(cloud)))
+        out.unordered = 1;
+    if (desc->drop_order)
+        out.info.count = out.info.drawn;
+    return desc->pack && !cloud->packed ? save_packed(cloud, path, &out) : save(cloud, path, &out);
+}
+
+int patina_cloud_save_as(const patina_cloud *cloud, const char *path, const patina_save_desc *given)
+{
+    patina_save_desc desc;
     if (!cloud || !path)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save: bad arguments");
-    int error = pt_paged_refuse(cloud, "patina_cloud_save");
+    int error = pt_take(NULL, "patina_cloud_save_as", given, &desc, sizeof desc);
+    if (!error && (desc.pack > 1 || desc.drop_order > 1))
+        error = pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save_as: pack and drop_order are 0 or 1");
+    if (!error)
+        error = pt_paged_refuse(cloud, "patina_cloud_save");
     if (!error)
         error = pt_pages_refuse(cloud, pt_free_memory() / 3, NULL);
     if (error)
         return error;
     pt_paged_enter(cloud, 1);
-    error = save(cloud, path);
+    error = save_as(cloud, path, &desc);
     pt_paged_leave(cloud);
     return error;
 }
+
+int patina_cloud_save(const patina_cloud *cloud, const char *path) { return patina_cloud_save_as(cloud, path, NULL); }
 
 // ---- open --------------------------------------------------------------------------------------------------------------
 
@@ -253,7 +361,8 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
         for (int k = 0; k < 3; k++)
             sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] + (double)chunk->cone_axis[k];
         if (chunk->first != next || !chunk->count || chunk->count > chunk->padded || chunk->padded % PT_CHUNK_ALIGN ||
-            chunk->padded > cloud->slots - next || !isfinite(sum) || !isfinite(chunk->cone_cosine))
+            chunk->padded > PT_CHUNK_POINTS || chunk->padded > cloud->slots - next || !isfinite(sum) ||
+            !isfinite(chunk->cone_cosine))
             return refuse(path, "a chunk is damaged");
         next += chunk->padded;
         drawn += chunk->count;
@@ -263,23 +372,25 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
     return pt_sights_good(&cloud->sights) ? PATINA_OK : refuse(path, "what its stations saw is damaged");
 }
 
-static int check_header(const char *path, const struct header *header, uint64_t size)
+static int check_version(const char *path, const struct header *header, const patina_cloud_info *info, uint64_t size)
 {
     if (memcmp(header->magic, magic, sizeof magic))
         return refuse(path, "not a saved cloud");
-    if ((header->version != VERSION && header->version != WITHOUT_PAGES) || header->chunk_size != sizeof(struct pt_chunk) ||
-        header->info.struct_size != sizeof header->info)
+    if ((header->version != VERSION && header->version != UNPACKED && header->version != WITHOUT_PAGES) ||
+        header->chunk_size != sizeof(struct pt_chunk) || info->struct_size != INFO_BYTES)
         return refuse(path, "a saved cloud of another version");
-    if (header->size != size)
-        return refuse(path, "a saved cloud that was cut short");
-    if (header->color_format > PT_COLOR_FLOAT || header->info.count > 0x7FFFFFFF ||
-        header->info.chunks != header->chunk_count || header->slots > 2 * header->info.count + 16ull * header->chunk_count ||
-        header->chunk_count > header->info.count || header->info.drawn > header->info.count ||
-        header->info.has_colors != (header->color_format != PT_COLOR_NONE) || header->info.has_opacities > 1 ||
-        header->info.has_normals > 1 || header->info.has_radii > 1 || !isfinite(header->info.radius_most) ||
+    return header->size == size ? PATINA_OK : refuse(path, "a saved cloud that was cut short");
+}
+
+static int check_header(const char *path, const struct header *header, const patina_cloud_info *info)
+{
+    if (header->color_format > PT_COLOR_FLOAT || info->count > 0x7FFFFFFF || info->chunks != header->chunk_count ||
+        header->slots > 2 * info->count + 16ull * header->chunk_count || header->chunk_count > info->count ||
+        info->drawn > info->count || info->has_colors != (header->color_format != PT_COLOR_NONE) || info->has_opacities > 1 ||
+        info->has_normals > 1 || info->has_radii > 1 || !isfinite(info->radius_most) ||
         header->sight_count > header->sight_room || header->sight_room > 1u << 16 ||
-        header->sight_bytes > 2u * PT_SIGHT_BYTES || header->info.has_scalars > 1 || header->info.has_shapes > 1 ||
-        header->info.has_classes > 1 || !isfinite(header->spacing_base))
+        header->sight_bytes > 2u * PT_SIGHT_BYTES || info->has_scalars > 1 || info->has_shapes > 1 || info->has_classes > 1 ||
+        !isfinite(header->spacing_base) || header->packed > 1 || header->unordered > 1 || !isfinite(header->packed_error))
         return refuse(path, "its header is damaged");
     return PATINA_OK;
 }
@@ -303,10 +414,21 @@ static int read_header(const char *path, const struct pt_disk *disk, struct pati
     size_t got;
     if (pt_disk_read(disk, 0, header, sizeof *header, &got) || got != sizeof *header)
         return refuse(path, "not a saved cloud");
-    int code = check_header(path, header, disk->size);
+    if (header->version != VERSION) { // it has none of these
+        header->packed = header->unordered = 0;
+        header->packed_error = 0.0;
+    }
+    memcpy(&cloud->info, header->info, sizeof header->info);
+    int code = check_version(path, header, &cloud->info, disk->size);
+    code = code ? code : check_header(path, header, &cloud->info);
     if (code)
         return code;
-    cloud->info = header->info;
+    cloud->info.struct_size = sizeof cloud->info;
+    cloud->info.packed = header->packed;
+    cloud->info.packed_error = header->packed_error;
+    cloud->info.numbered = header->unordered;
+    cloud->packed = header->packed != 0;
+    cloud->unordered = header->unordered != 0;
     cloud->slots = header->slots;
     cloud->chunk_count = header->chunk_count;
     cloud->color_format = header->color_format;
@@ -331,7 +453,7 @@ static int read_pages(const char *path, const struct pt_disk *disk, const struct
     uint32_t *sums = malloc(size);
     if (!sums)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
-    if (pt_disk_read(disk, at, sums, size, &got) || got != size || add_piece(VERSION, sums, size) != header->page_sum) {
+    if (pt_disk_read(disk, at, sums, size, &got) || got != size || add_piece(header->version, sums, size) != header->page_sum) {
         free(sums);
         return refuse(path, "the check sums of its pages are damaged");
     }
@@ -363,6 +485,8 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
         cloud->mapped |= (uint32_t)(sections[i].size > 0) << i;
     cloud->beside = header.beside != 0;
     code = check_cloud(path, cloud);
+    if (!code && cloud->unordered && pt_cloud_count_places(cloud))
+        code = pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
     if (!code)
         pt_clusters_make(cloud);
     return code ? code : read_pages(path, disk, &header, pages_at(sections), cloud);
@@ -402,15 +526,12 @@ static int sum_section(const struct verified *v, uint64_t at, uint64_t size, uin
 // What the header says of itself, chunks and the sums of pages; head: of the header and chunks.
 static int verify_head(const struct verified *v, const struct header *header, const struct pt_sum *head, uint64_t at)
 {
-    uint64_t check = pt_sum_end(head);
-    if (header->version != WITHOUT_PAGES)
-        check = pt_fingerprint(check, &header->page_sum, sizeof header->page_sum);
-    if (check != header->check)
+    if (add_tail(pt_sum_end(head), header) != header->check)
         return refuse(v->path, "its header or chunks are damaged");
     if (header->version == WITHOUT_PAGES || !header->chunk_count)
         return PATINA_OK;
     struct pt_sum pages;
-    pt_sum_begin(&pages, VERSION);
+    pt_sum_begin(&pages, header->version);
     const int code = sum_section(v, at, pt_page_sum_bytes(header->chunk_count), NULL, &pages);
     return code                                     ? code
            : pt_sum_end(&pages) != header->page_sum ? refuse(v->path, "the check sums of its pages are damaged")

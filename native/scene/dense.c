@@ -77,7 +77,9 @@ static uint32_t samples_of(const struct search *search, const struct pt_chunk *c
 
 static double coordinate(const struct patina_cloud *cloud, const struct pt_chunk *chunk, uint32_t i, int k)
 {
-    return chunk->origin[k] + (double)cloud->positions[3 * (size_t)chunk->first + (size_t)k * chunk->padded + i];
+    double p[3];
+    pt_point_place(cloud, chunk, i, p);
+    return p[k];
 }
 
 // ---- the core ------------------------------------------------------------------------------------------------------

@@ -42,10 +42,8 @@ static double luminance(const struct patina_cloud *cloud, size_t slot)
 
 static double distance(const struct fill *fill, const struct pt_chunk *chunk, size_t slot)
 {
-    const float *positions = fill->cloud->positions + 3 * (size_t)chunk->first + (slot - chunk->first);
     double p[3], q[3];
-    for (size_t k = 0; k < 3; k++)
-        p[k] = chunk->origin[k] + (double)positions[k * chunk->padded];
+    pt_point_place(fill->cloud, chunk, (uint32_t)(slot - chunk->first), p);
     pt_apply(fill->linear, p, q);
     for (int k = 0; k < 3; k++)
         q[k] += fill->translation[k];

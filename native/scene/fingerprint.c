@@ -97,13 +97,17 @@ static uint64_t fingerprint_array(uint64_t seed, const struct patina_cloud *clou
 
 static uint64_t fingerprint_of(const struct patina_cloud *cloud)
 {
-    uint64_t hash = fingerprint_array(cloud->info.count, cloud, cloud->positions, cloud->slots * 12);
+    const size_t size = cloud->slots * 4 * pt_position_words(cloud);
+    uint64_t hash = fingerprint_array(cloud->info.count, cloud, cloud->positions, size);
     hash = fingerprint_array(hash, cloud, cloud->surfels, cloud->slots * 4);
     if (cloud->shapes)
         hash = fingerprint_array(hash, cloud, cloud->shapes, cloud->slots * 4);
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
+        const float step = cloud->packed ? pt_chunk_step(chunk) : 0.0f;
         hash = pt_fingerprint(hash, chunk->origin, sizeof chunk->origin);
+        if (cloud->packed)
+            hash = pt_fingerprint(hash, &step, sizeof step);
     }
     if (cloud->opacities)
         hash = fingerprint_array(hash, cloud, cloud->opacities, cloud->slots);

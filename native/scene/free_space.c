@@ -55,10 +55,10 @@ static uint32_t station_at(const patina_array *array, uint64_t number)
 
 static struct sight sight_of(const struct look *look, const struct pt_chunk *chunk, uint32_t i)
 {
-    const float *p = look->job->cloud->positions + 3 * (size_t)chunk->first + i;
     double v[3];
+    pt_point_place(look->job->cloud, chunk, i, v);
     for (size_t k = 0; k < 3; k++)
-        v[k] = chunk->origin[k] + (double)p[k * chunk->padded] - look->eye[k];
+        v[k] -= look->eye[k];
     const double flat = v[0] * v[0] + v[1] * v[1];
     return (struct sight){sqrt(flat + v[2] * v[2]), pt_atan2(v[1], v[0]), pt_atan2(v[2], sqrt(flat))};
 }

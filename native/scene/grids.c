@@ -48,12 +48,6 @@ static uint32_t scan_of(const patina_analysis_desc *desc, uint32_t number)
     return wide;
 }
 
-static void place_in(const struct patina_cloud *cloud, const struct pt_chunk *chunk, uint32_t i, double p[3])
-{
-    for (uint32_t k = 0; k < 3; k++)
-        p[k] = chunk->origin[k] + (double)cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + i];
-}
-
 // Counts scans, and finds of each its grid's size, its station, and an origin near its points.
 static int survey(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_grids *out)
 {
@@ -76,7 +70,7 @@ static int survey(const struct patina_cloud *cloud, const patina_analysis_desc *
             double p[3];
             if (!of->scan.count++) {
                 memcpy(of->origin, chunk->origin, sizeof of->origin);
-                place_in(cloud, chunk, i, p);
+                pt_point_place(cloud, chunk, i, p);
                 of->station = desc->station_count ? pt_station_of(desc, number, p) : UINT32_MAX;
             }
             if (row >= INT32_MAX || column >= INT32_MAX)
@@ -110,7 +104,7 @@ static void fill_cells(const struct patina_cloud *cloud, const patina_analysis_d
             const uint64_t row = pt_line_at(&desc->row, number), column = pt_line_at(&desc->column, number);
             struct pt_grid_of *of = &out->each[scan_of(desc, number)];
             double p[3];
-            place_in(cloud, chunk, i, p);
+            pt_point_place(cloud, chunk, i, p);
             for (int k = 0; k < 3; k++)
                 out->position[3 * (size_t)slot + (size_t)k] = (float)(p[k] - of->origin[k]);
             if (!of->grid.points || row >= of->scan.rows || column >= of->scan.columns)

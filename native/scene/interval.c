@@ -78,8 +78,7 @@ uint32_t pt_line_at(const patina_array *array, uint64_t number)
 static uint32_t look(const struct count *count, const struct pt_chunk *chunk, uint32_t i, double d[3])
 {
     double p[3];
-    for (uint32_t k = 0; k < 3; k++)
-        p[k] = chunk->origin[k] + (double)count->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + i];
+    pt_point_place(count->cloud, chunk, i, p);
     const uint32_t s = pt_station_of(count->desc, pt_number_of(count->cloud, chunk->first + i), p);
     for (int k = 0; k < 3; k++)
         d[k] = p[k] - count->desc->stations[3 * s + k];

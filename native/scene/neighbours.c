@@ -89,10 +89,11 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     struct fill *fill = context;
     struct pt_neighbours *tree = fill->tree;
     struct place places[PT_CHUNK_POINTS];
+    float unpacked[3 * PT_CHUNK_POINTS];
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_progress_cancelled(fill->progress); c++) {
         const struct pt_chunk *chunk = &tree->cloud->chunks[c];
-        const float *xyz = tree->cloud->positions + 3 * (size_t)chunk->first;
+        const float *xyz = pt_chunk_positions(tree->cloud, chunk, unpacked);
         const uint32_t first = tree->chunk_leaf[c], count = pt_neighbours_of_chunk(tree, c);
         for (uint32_t i = 0; i < count; i++)
             places[i] = (struct place){{xyz[i], xyz[chunk->padded + i], xyz[2 * chunk->padded + i]}, chunk->first + i};

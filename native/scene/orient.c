@@ -121,11 +121,13 @@ static void set_axes(struct orient *orient, int i, double turn[2])
 struct projected {
     float u[PT_CHUNK_POINTS], v[PT_CHUNK_POINTS], depth[PT_CHUNK_POINTS];
     float facing[PT_CHUNK_POINTS], length[PT_CHUNK_POINTS]; // n . axis of normals this long
+    float unpacked[3 * PT_CHUNK_POINTS];
 };
 
 static void project(const struct orient *orient, const struct view *view, const struct pt_chunk *chunk, struct projected *out)
 {
-    const float *x = orient->tree->cloud->positions + 3 * (size_t)chunk->first, *y = x + chunk->padded, *z = y + chunk->padded;
+    const float *x = pt_chunk_positions(orient->tree->cloud, chunk, out->unpacked), *y = x + chunk->padded,
+                *z = y + chunk->padded;
     float *const to[3] = {out->u, out->v, out->depth};
     for (int a = 0; a < 3; a++) {
         const float ax = view->axis[a][0], ay = view->axis[a][1], az = view->axis[a][2];

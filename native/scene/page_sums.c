@@ -10,15 +10,6 @@ static uint32_t fold(uint64_t sum) { return (uint32_t)(sum ^ sum >> 32); }
 
 static uint64_t seed_of(uint32_t chunk, enum pt_array array) { return (uint64_t)chunk << 8 | (uint64_t)array; }
 
-// Bytes of a point of an array that the cloud has, in a file or not.
-static uint32_t point_bytes(const struct patina_cloud *cloud, enum pt_array array)
-{
-    static const uint8_t bytes[PT_ARRAYS] = {
-        [PT_ARRAY_POSITIONS] = 12, [PT_ARRAY_ORDER] = 4,   [PT_ARRAY_SURFELS] = 4, [PT_ARRAY_OPACITIES] = 1,
-        [PT_ARRAY_RADII] = 4,      [PT_ARRAY_SCALARS] = 4, [PT_ARRAY_CLASSES] = 1, [PT_ARRAY_SHAPES] = 4};
-    return array == PT_ARRAY_COLORS ? (uint32_t)pt_color_size(cloud->color_format) : bytes[array];
-}
-
 // ---- written -----------------------------------------------------------------------------------------------------------
 
 int pt_page_summing_begin(struct pt_page_summing *summing, uint32_t chunks)
@@ -36,7 +27,7 @@ void pt_page_summing_add(struct pt_page_summing *summing, const struct patina_cl
         const uint32_t c = summing->chunk[array];
         uint64_t *left = &summing->left[array];
         if (!*left) {
-            *left = (uint64_t)cloud->chunks[c].padded * point_bytes(cloud, array);
+            *left = (uint64_t)cloud->chunks[c].padded * pt_cloud_array_bytes(cloud, array);
             pt_sum_begin(&summing->sum[array], seed_of(c, array));
         }
         const size_t some = size < *left ? size : (size_t)*left;
@@ -126,7 +117,7 @@ static int is_good(const struct patina_cloud *cloud, uint32_t c, enum pt_array a
     struct patina_cloud copy = *cloud;
     struct pt_section sections[PT_ARRAYS];
     const struct pt_chunk *chunk = &cloud->chunks[c];
-    const uint64_t each = point_bytes(cloud, array);
+    const uint64_t each = pt_cloud_array_bytes(cloud, array);
     pt_cloud_sections(&copy, sections);
     const char *data = (const char *)*sections[array].data + chunk->first * each;
     const uint64_t sum = pt_fingerprint(seed_of(c, array), data, (size_t)(chunk->padded * each));

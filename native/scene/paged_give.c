@@ -49,7 +49,7 @@ static int check_page(const struct patina_cloud *cloud, uint32_t index, const st
 static void copy_page(struct patina_cloud *cloud, struct pt_page *page, const struct patina_cloud *made)
 {
     const uint64_t at = page->first_slot, slots = page->slots, color = pt_color_size(cloud->color_format);
-    memcpy(cloud->positions + 3 * at, made->positions, 12 * slots);
+    memcpy((float *)cloud->positions + 3 * at, made->positions, 12 * slots);
     memcpy(cloud->surfels + at, made->surfels, 4 * slots);
     for (uint64_t i = 0; i < slots; i++)
         cloud->order[at + i] = page->first_number + made->order[i];

@@ -8,6 +8,7 @@
 #include "shared/words.h"
 #include "lib/planes.glsl"
 #include "lib/points.glsl"
+#include "lib/positions.glsl"
 #include "lib/by_pixel.glsl"
 #include "lib/srgb.glsl"
 
@@ -22,7 +23,6 @@ layout(local_size_x = 32, local_size_y = 8) in;
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { average_args args; };
 layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[]; };
 layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
@@ -99,13 +99,12 @@ void main()
     view_args view = args.view;
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y), top = float(view.origin_y + int(view.height));
-    uint base = 3u * (chunk.first - first_slot);
+    uint base = chunk.first - first_slot;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
 
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         // 1. where the point lies, and how far its tent reaches
-        uint at = base + i;
-        vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+        vec3 p = pt_position(base, chunk.padded, chunk.step, i);
         vec3 seen = pt_project(view, chunk, p);
         float x = seen.x, y = seen.y, z = seen.z;
         if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
@@ -113,7 +112,7 @@ void main()
         if (args.sifted != 0u && chunk.sifted != 0u &&
             (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
             continue;
-        uint slot = chunk.first - first_slot + i, word = surfels[slot];
+        uint slot = base + i, word = surfels[slot];
         if (chunk.cull != 0u && pt_faces_away(chunk, word, p))
             continue;
         float footprint = pt_footprint(view, z);

@@ -6,6 +6,7 @@
 #version 430 core
 #include "shared/measured.h"
 #include "lib/math.glsl"
+#include "lib/positions.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -15,7 +16,6 @@ layout(std430, binding = BIND_normal) readonly buffer normal_block { vec4 normal
 layout(std430, binding = BIND_deff) readonly buffer deff_block { float deff[]; };
 layout(std430, binding = BIND_offset) writeonly buffer offset_block { float offset[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
@@ -29,12 +29,11 @@ void main()
     vec3 row_z = vec3(chunk.row[6], chunk.row[7], chunk.row[8]);
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y), top = float(view.origin_y + int(view.height));
-    uint base = 3u * (chunk.first - first_slot);
+    uint base = chunk.first - first_slot;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
 
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
-        uint at = base + i;
-        vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+        vec3 p = pt_position(base, chunk.padded, chunk.step, i);
         precise float z = (((chunk.lo[2] + row_z.x * p.x) + row_z.y * p.y) + row_z.z * p.z) + chunk.hi[2];
         precise float x = (((chunk.lo[0] + row_x.x * p.x) + row_x.y * p.y) + row_x.z * p.z) + chunk.hi[0];
         precise float y = (((chunk.lo[1] + row_y.x * p.x) + row_y.y * p.y) + row_y.z * p.z) + chunk.hi[1];

@@ -6,6 +6,7 @@
 #include "shared/shadows.h"
 #include "shared/words.h"
 #include "lib/points.glsl"
+#include "lib/positions.glsl"
 #include "lib/shadow_words.glsl"
 
 layout(local_size_x = 64) in;
@@ -13,7 +14,6 @@ layout(local_size_x = 64) in;
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { dim_args args; };
 layout(std430, binding = BIND_veil) readonly buffer veil_block { float veil[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 layout(std430, binding = BIND_marks) readonly buffer marks_block { uint marks[]; };
 layout(std430, binding = BIND_shadows) buffer shadows_block { uint words[]; };
 layout(std430, binding = BIND_differs) buffer differs_block { uint differs[]; };
@@ -33,10 +33,10 @@ float texel_at(view_args view, uint column, uint row, uint slab, float into)
 float clamped(float x, uint most) { return pt_min(pt_max(x, 0.0), float(most)); }
 
 // What is taken of 255 from a point.
-uint loss_of(view_args view, chunk_view chunk, uint at)
+uint loss_of(view_args view, chunk_view chunk, uint base, uint i)
 {
     // 1. project
-    vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+    vec3 p = pt_position(base, chunk.padded, chunk.step, i);
     vec3 seen = pt_project(view, chunk, p);
     float x = seen.x, y = seen.y, z = seen.z;
     if (!(args.window[0] <= x && x < args.window[2] && args.window[1] <= y && y < args.window[3] && view.z_near <= z))
@@ -70,7 +70,7 @@ void main()
         uint id = chunk.first + i;
         if (args.marked != 0u && (marks[id >> 2] >> 8u * (id & 3u) & 255u) == 0u)
             continue;
-        uint loss = loss_of(view, chunk, 3u * base + i);
+        uint loss = loss_of(view, chunk, base, i);
         if (!all && loss == 0u)
             continue;
         bool differ;

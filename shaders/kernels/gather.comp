@@ -7,6 +7,7 @@
 #version 430 core
 #include "shared/balls.h"
 #include "lib/math.glsl"
+#include "lib/positions.glsl"
 #include "lib/srgb.glsl"
 
 layout(local_size_x = 64) in;
@@ -19,7 +20,6 @@ layout(std430, binding = BIND_arguments) readonly buffer arguments_block {
 };
 layout(std430, binding = BIND_points) writeonly buffer points_block { vec4 records[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_field) readonly buffer field_block { uint field[]; };
 layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
@@ -56,8 +56,7 @@ bool read_word(uint word, inout point p)
 bool place(chunk_view chunk, uint i, inout point p)
 {
     view_args view = args.view;
-    uint at = 3u * (chunk.first - first_slot) + i;
-    vec3 q = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+    vec3 q = pt_position(chunk.first - first_slot, chunk.padded, chunk.step, i);
     precise float x = (((chunk.lo[0] + chunk.row[0] * q.x) + chunk.row[1] * q.y) + chunk.row[2] * q.z) + chunk.hi[0];
     precise float y = (((chunk.lo[1] + chunk.row[3] * q.x) + chunk.row[4] * q.y) + chunk.row[5] * q.z) + chunk.hi[1];
     precise float z = (((chunk.lo[2] + chunk.row[6] * q.x) + chunk.row[7] * q.y) + chunk.row[8] * q.z) + chunk.hi[2];

@@ -16,6 +16,8 @@
 #include "shared/points.h"
 #include "lib/planes.glsl"
 #include "lib/points.glsl"
+#define PT_POSITION_TEXELS
+#include "lib/positions.glsl"
 
 #ifdef PT_SOFTWARE
 layout(local_size_x = 8) in;
@@ -48,8 +50,7 @@ void main()
 
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         // 1. project
-        uint at = 3u * base + i;
-        vec3 p = vec3(read_float(at), read_float(at + chunk.padded), read_float(at + 2u * chunk.padded));
+        vec3 p = pt_position(base, chunk.padded, chunk.step, i);
         vec3 seen = pt_project(view, chunk, p);
         float x = seen.x, y = seen.y, z = seen.z;
         // 2. clip: NaN fails every comparison; what was sifted out is not drawn

@@ -7,6 +7,7 @@
 #include "shared/words.h"
 #include "lib/planes.glsl"
 #include "lib/points.glsl"
+#include "lib/positions.glsl"
 #include "lib/by_pixel.glsl"
 #include "lib/shadow_words.glsl"
 
@@ -14,7 +15,6 @@ layout(local_size_x = 64) in;
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { shadow_test_args args; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_marks) readonly buffer marks_block { uint marks[]; };
 layout(std430, binding = BIND_shadows) buffer shadows_block { uint words[]; };
@@ -81,11 +81,12 @@ float layer_distance(view_args view, vec2 ray, float z, uint id, out bool none)
 }
 
 // pixel: of the map, where the point is.
-bool in_shadow(view_args view, chunk_view chunk, uint at, uint id, out uint pixel)
+bool in_shadow(view_args view, chunk_view chunk, uint i, out uint pixel)
 {
     pixel = 0u;
     // 1. project
-    vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+    uint id = chunk.first + i;
+    vec3 p = pt_position(chunk.first - first_slot, chunk.padded, chunk.step, i);
     vec3 seen = pt_project(view, chunk, p);
     float x = seen.x, y = seen.y, z = seen.z;
     if (!(args.window[0] <= x && x < args.window[2] && args.window[1] <= y && y < args.window[3] && view.z_near <= z))
@@ -137,14 +138,13 @@ void main()
     precise float wider = view.footprint * PT_TEXEL_SLACK;
     view.footprint = wider;
     bool all = args.close != 0u || args.compare != 0u; // lit points have to be looked at too
-    uint base = chunk.first - first_slot;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         uint id = chunk.first + i;
         if (args.marked != 0u && (marks[id >> 2] >> 8u * (id & 3u) & 255u) == 0u)
             continue;
         uint pixel;
-        bool shadowed = in_shadow(view, chunk, 3u * base + i, id, pixel);
+        bool shadowed = in_shadow(view, chunk, i, pixel);
         if ((all || shadowed) && note(args.base + id, shadowed ? loss_at(pixel) : 0u) && args.compare != 0u)
             differs[0] = 1u;
     }

@@ -6,12 +6,12 @@
 #version 430 core
 #include "shared/points.h"
 #include "lib/math.glsl"
+#include "lib/positions.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { sift_args args; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 layout(std430, binding = BIND_classes) readonly buffer classes_block { uint classes[]; }; // four bytes a word
 layout(std430, binding = BIND_clips) readonly buffer clips_block { clip_view clips[]; };
 layout(std430, binding = BIND_drawn) writeonly buffer drawn_block { uint drawn[]; };
@@ -63,8 +63,8 @@ void main()
     for (uint w = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; w < end; w += stride) {
         uint bits = 0u;
         for (uint i = 0u; i < PT_SLOTS_A_WORD; i++) {
-            uint slot = PT_SLOTS_A_WORD * w + i, at = 3u * base + slot;
-            vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+            uint slot = PT_SLOTS_A_WORD * w + i;
+            vec3 p = pt_position(base, chunk.padded, chunk.step, slot);
             bool keep = chunk.clip_keeps == 0u, cut = args.by_class != 0u && hidden_class(base + slot);
             cut = cut || (args.by_shape != 0u && hidden_shape(base + slot));
             cut = cut || (args.by_field != 0u && args.threshold < field[base + slot] >> PT_FIELD_SHIFT);

@@ -7,6 +7,7 @@
 #include "lib/ranges.glsl"
 #include "lib/planes.glsl"
 #include "lib/points.glsl"
+#include "lib/positions.glsl"
 
 #if STEP == 0
 layout(local_size_x = 64) in;
@@ -18,7 +19,6 @@ layout(local_size_x = 32, local_size_y = 8) in;
 
 layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[]; };
 
@@ -62,8 +62,8 @@ bool pt_point_of(chunk_view chunk, uint i, out pt_cell_point point)
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y + band_first), top = float(view.origin_y + band_end);
     // 1. where it lies
-    uint base = chunk.first - first_slot, at = 3u * base + i;
-    vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+    uint base = chunk.first - first_slot;
+    vec3 p = pt_position(base, chunk.padded, chunk.step, i);
     vec3 seen = pt_project(view, chunk, p);
     float x = seen.x, y = seen.y, z = seen.z;
     if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))

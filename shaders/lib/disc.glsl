@@ -12,13 +12,13 @@
 #include "shared/words.h"
 #include "lib/planes.glsl"
 #include "lib/points.glsl"
+#include "lib/positions.glsl"
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of what points have begins
 layout(location = 2) uniform uint instance;    // whose points these are
 
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_radii) readonly buffer radii_block { uint radii[]; }; // floats or shape words
 
@@ -276,11 +276,11 @@ void disc_shape(view_args view, uint word, inout disc d)
 // 1. The disc of a chunk's point; false: it is not drawn.
 bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
 {
-    uint base = chunk.first - first_slot, at = 3u * base + slot;
+    uint base = chunk.first - first_slot;
     if (chunk.sifted != 0u &&
         (read_word(chunk.sifted - 1u + slot / PT_SLOTS_A_WORD) >> slot % PT_SLOTS_A_WORD & 1u) == 0u)
         return false;
-    vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+    vec3 p = pt_position(base, chunk.padded, chunk.step, slot);
     vec3 seen = pt_project(view, chunk, p);
     float x = seen.x, y = seen.y, z = seen.z;
     // NaN fails every comparison

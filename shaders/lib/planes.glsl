@@ -28,6 +28,7 @@ uint read_z_bits(uint pixel) { return texelFetch(key_plane, int(pixel)).y; }
 float read_z(uint pixel) { return uintBitsToFloat(texelFetch(key_plane, int(pixel)).y); }
 uint read_word(uint i) { return texelFetch(word_plane, int(i)).x; }
 float read_float(uint i) { return texelFetch(deff_plane, int(i)).x; } // of kernels that read no deff plane
+uint read_position(uint i) { return texelFetch(from_plane, int(i)).x; } // of kernels that read no from plane
 uint read_from(uint pixel) { return texelFetch(from_plane, int(pixel)).x & ~PT_FROM_MIXED; }
 float read_deff(uint pixel) { return texelFetch(deff_plane, int(pixel)).x; }
 float read_span(uint pixel) { return uintBitsToFloat(texelFetch(word_plane, int(pixel)).x); } // of kernels that read no words

@@ -60,7 +60,7 @@ struct chunk_view {
     float row[9];   // x row, y row, z row
     float hi[3], lo[3];
     float eye[4];   // back-face test: n . (eye.xyz - eye.w p) <= 0 is culled; object units, relative to the chunk's origin
-    uint32_t first; // first slot, and number of its point; positions at 3 first: x[padded], y[padded], z[padded]
+    uint32_t first; // first slot, and number of its point. Positions at 3 first: x[padded], y[padded], z[padded]; packed: at 2 first
     uint32_t count, padded;
     uint32_t cull;  // 1: test each point's normal
     uint32_t id_base;
@@ -70,6 +70,7 @@ struct chunk_view {
     uint32_t column_first, column_end; // likewise
     float z_least;               // no point of it is seen nearer; 0: not known
     uint32_t record;             // gather: where those of its points begin
+    float step;                  // of packed positions, a power of two; 0: they are floats
 };
 
 // What the per-instance kernels (normals, resolve, shade) know of an instance of a cloud.

@@ -135,7 +135,7 @@ struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
         struct cloud *cloud = &scene->points.clouds[i];
         points_pad(cloud);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
-        buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+        buffers[n++] = points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots);
         buffers[n++] = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
         buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->slots);
     }

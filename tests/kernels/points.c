@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "points.h"
+#include "shared/packed.h"
 #include "shared/words.h"
 
+#include <math.h>
 #include <string.h>
 
 static void random_rotation(struct rng *rng, double m[9])
@@ -87,6 +89,53 @@ void points_pad(struct cloud *cloud)
             cloud->surfels[chunk->first + i] = cloud->surfels[chunk->first + chunk->count - 1];
         }
     }
+    points_settle(cloud->chunks, cloud->chunk_count, cloud->positions);
+}
+
+static int packing;
+
+void points_packed(struct harness *h, void (*run)(struct harness *h))
+{
+    packing = 1;
+    run(h);
+    packing = 0;
+}
+
+void points_settle(struct chunk_view *chunks, uint32_t count, float *positions)
+{
+    for (uint32_t c = 0; c < count && packing; c++) {
+        float *own = positions + 3 * (size_t)chunks[c].first, most = 0.0f;
+        const uint32_t all = 3 * chunks[c].padded;
+        for (uint32_t i = 0; i < all; i++)
+            most = fmaxf(most, fabsf(own[i]));
+        if (!(chunks[c].step > 0.0f)) // else they are rounded
+            chunks[c].step = exp2f(ceilf(log2f(most / (float)(PT_PACKED_MIDDLE - 1) + 1e-30f)));
+        for (uint32_t i = 0; i < all; i++)
+            own[i] = ((float)pt_packed_part(own[i], chunks[c].step) - (float)PT_PACKED_MIDDLE) * chunks[c].step;
+    }
+}
+
+struct pt_buffer *points_positions(struct harness *h, const struct chunk_view *chunks, uint32_t count, const float *positions,
+                                   uint32_t slots)
+{
+    if (!count || !(chunks[0].step > 0.0f))
+        return harness_buffer(h, positions, 4 * PT_POSITION_WORDS * (size_t)slots);
+    uint32_t *words = harness_alloc(h, 4 * PT_PACKED_WORDS * (size_t)slots);
+    for (uint32_t c = 0; c < count; c++)
+        for (uint32_t i = 0, padded = chunks[c].padded; i < padded; i++) {
+            const float *own = positions + 3 * (size_t)chunks[c].first + i;
+            const float p[3] = {own[0], own[padded], own[2 * (size_t)padded]};
+            uint32_t pair[2], *to = words + 2 * (size_t)chunks[c].first + i;
+            float again[3];
+            pt_packed_words(p, chunks[c].step, pair);
+            pt_packed_point(pair[0], pair[1], chunks[c].step, again);
+            HARNESS_CHECK(h, !memcmp(p, again, sizeof p) || (p[0] == again[0] && p[1] == again[1] && p[2] == again[2]));
+            to[0] = pair[0];
+            to[padded] = pair[1];
+        }
+    struct pt_buffer *buffer = harness_buffer(h, words, 4 * PT_PACKED_WORDS * (size_t)slots);
+    buffer->each = 4 * PT_PACKED_WORDS;
+    return buffer;
 }
 
 struct view_args points_window(uint32_t width, uint32_t height, int perspective, double focal)

@@ -41,6 +41,13 @@ struct cloud *points_add_cloud(struct harness *h, struct rng *rng, struct scene 
 float *points_coordinate(struct cloud *cloud, uint32_t chunk, uint32_t slot, int axis);
 // Points anywhere in the cube [-size, size]^3.
 void points_scatter_about(struct rng *rng, struct cloud *cloud, double size);
-void points_pad(struct cloud *cloud); // padding repeats the last point
+void points_pad(struct cloud *cloud); // padding repeats the last point; then they are packed, where a case says so
+
+// Runs a case once more with all its points packed: they are rounded in place where points_pad, or points_settle, is called.
+void points_packed(struct harness *h, void (*run)(struct harness *h));
+void points_settle(struct chunk_view *chunks, uint32_t count, float *positions);
+// The buffer of positions, packed where the chunks are.
+struct pt_buffer *points_positions(struct harness *h, const struct chunk_view *chunks, uint32_t count, const float *positions,
+                                   uint32_t slots);
 
 #endif

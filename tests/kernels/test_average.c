@@ -150,7 +150,7 @@ static struct planes run(struct harness *h, struct rng *rng, struct setup *s, do
     struct pt_buffer *deff = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
     struct pt_buffer *from = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
     struct pt_buffer *chunks = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
-    struct pt_buffer *positions = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+    struct pt_buffer *positions = points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots);
     struct pt_buffer *surfels = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->color_bytes);
     struct pt_buffer *drawn = harness_buffer(h, scene->drawn, 4 * (size_t)scene->words);
@@ -320,9 +320,17 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, ref_average(&args, tents, looks, 2, 0, 2.0f, 0.5f, n, 1, 4, 4).color[0] == 1.0);
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, perspective);
+    points_packed(h, orthographic);
+    points_packed(h, sifted);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
+        {"packed positions", packed, 0},
         {"sanity", sanity, 1},
         {"random points, perspective", perspective, 0},
         {"random points, orthographic", orthographic, 0},

@@ -251,7 +251,7 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
         const struct resolve_args of_pixels = {.view = points->view, .instance = scene->discs[i].instance};
         HARNESS_RUN(h, resolve, &of_pixels, keys, surfels, zero, deff, from, NULL, NULL);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
-        buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+        buffers[n++] = points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots);
         buffers[n++] = surfels;
         buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->slots);
         buffers[n++] = harness_buffer(h, paint->colors[i], paint->color_bytes[i]);
@@ -541,9 +541,16 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, ref_blend(&view, discs, looks, around, 2, 0, 2.0f, 0.5f, n, 32, 32).color[0] == 1.0);
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, perspective);
+    points_packed(h, orthographic);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
+        {"packed positions", packed, 0},
         {"sanity", sanity, 1},
         {"random discs, perspective", perspective, 0},
         {"random discs, orthographic", orthographic, 0},

@@ -28,7 +28,7 @@ static uint64_t *keys_of(struct harness *h, struct scene *scene, struct pt_buffe
         struct cloud *cloud = &scene->clouds[i];
         points_pad(cloud);
         buffers[n++] = chunks[i] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
-        buffers[n++] = positions[i] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+        buffers[n++] = positions[i] = points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots);
         buffers[n++] = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     }
     struct scatter_args args = {.view = scene->view, .instances = scene->count};
@@ -142,12 +142,17 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, fabs(out.low + 0.125) < 1e-5 && fabs(out.high + 0.125) < 1e-5);
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, perspective);
+    points_packed(h, orthographic);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"sanity", sanity, 1},
-        {"perspective", perspective, 0},
-        {"orthographic", orthographic, 0},
+        {"packed positions", packed, 0},     {"sanity", sanity, 1},
+        {"perspective", perspective, 0},     {"orthographic", orthographic, 0},
         {"many points a pixel", crowded, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);

@@ -101,7 +101,7 @@ static struct cells run(struct harness *h, struct setup *s, double open)
     struct pt_buffer *most = harness_buffer(h, high, (size_t)CELLS * 4);
     struct pt_buffer *inclined = harness_buffer(h, s->inclined, (size_t)CELLS * 16);
     struct pt_buffer *chunks = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
-    struct pt_buffer *positions = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+    struct pt_buffer *positions = points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots);
     struct pt_buffer *surfels = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     struct pt_buffer *scans = harness_buffer(h, s->scans, (size_t)cloud->slots * 2 + 4);
     struct pt_buffer *drawn = s->args.sifted ? harness_buffer(h, scene->drawn, 4 * (size_t)scene->words) : NULL;
@@ -195,9 +195,16 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, harness_near(one.most - one.least, 0.0, 1e-9));
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, perspective);
+    points_packed(h, orthographic);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
+        {"packed positions", packed, 0},
         {"sanity", sanity, 1},
         {"random points, perspective", perspective, 0},
         {"random points, orthographic", orthographic, 0},

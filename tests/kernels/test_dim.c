@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // dim: points before, in and behind the slabs of a light's view; what samples and maps add up to.
-#include "harness.h"
+#include "points.h"
 #include "shared/balls.h"
 #include "shared/shadows.h"
 #include "shared/words.h"
@@ -68,6 +68,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, ui
                 s.positions[3 * (size_t)s.chunks[c].first + k * s.chunks[c].padded + i] = (float)p[k];
         }
     }
+    points_settle(s.chunks, CHUNKS, s.positions);
     for (uint32_t i = 0; i < SLOTS; i++)
         s.marks[i] = (uint8_t)rng_below(rng, 2);
     return s;
@@ -92,7 +93,8 @@ static void check(struct harness *h, const struct setup *s, uint32_t base)
     args.base = base;
     struct pt_buffer *veil = harness_buffer(h, s->veil, (size_t)WIDTH * HEIGHT * args.veils * 4);
     struct pt_buffer *chunks = harness_buffer(h, s->chunks, sizeof s->chunks);
-    struct pt_buffer *positions = harness_buffer(h, s->positions, SLOTS * 12), *marks = harness_buffer(h, s->marks, SLOTS);
+    struct pt_buffer *positions = points_positions(h, s->chunks, CHUNKS, s->positions, SLOTS),
+                     *marks = harness_buffer(h, s->marks, SLOTS);
     struct pt_buffer *words = harness_buffer(h, s->words, (SLOTS + OTHERS) * 4), *flag = harness_buffer(h, &differs, 4);
     HARNESS_RUN(h, dim, &args, veil, chunks, positions, marks, words, flag);
     const uint32_t *got = harness_read(h, words), *got_flag = harness_read(h, flag);
@@ -164,11 +166,18 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, ref_dim_at(&args, veil, 0.5, 0.5, 0.5) == 0.0);
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, maps);
+    points_packed(h, samples);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
         {"maps", maps, 0},
         {"samples", samples, 0},
+        {"packed positions", packed, 0},
         {"sanity", sanity, 1},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);

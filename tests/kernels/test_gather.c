@@ -159,8 +159,8 @@ static uint32_t run(struct harness *h, const struct setup *s)
     uint32_t drawn = 0;
     struct pt_buffer *points = harness_buffer(h, harness_alloc(h, size), size);
     HARNESS_RUN(h, gather, &s->args, points, harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
-                harness_buffer(h, cloud->positions, 12 * slots), harness_buffer(h, cloud->surfels, 4 * slots),
-                harness_buffer(h, s->field, 4 * slots),
+                points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots),
+                harness_buffer(h, cloud->surfels, 4 * slots), harness_buffer(h, s->field, 4 * slots),
                 instance->color_format ? harness_buffer(h, s->colors, s->colors_size) : NULL,
                 instance->has_opacities ? harness_buffer(h, s->opacities, (slots + 3) / 4 * 4) : NULL,
                 harness_buffer(h, s->shadows, 8 * slots), s->drawn ? harness_buffer(h, s->drawn, slots) : NULL,
@@ -302,12 +302,23 @@ static void ends(struct harness *h)
     HARNESS_CHECK(h, run(h, &s) == 0);
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, formats);
+    points_packed(h, radii);
+    points_packed(h, about_the_eye);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"formats of colours", formats, 0},   {"unlit, directed, a ramp", unlit_directed_and_a_ramp, 0},
-        {"radii from 1e-3 to 1e3", radii, 0}, {"words", words, 0},
-        {"about the eye", about_the_eye, 0},  {"ends", ends, 0},
+        {"packed positions", packed, 0},
+        {"formats of colours", formats, 0},
+        {"unlit, directed, a ramp", unlit_directed_and_a_ramp, 0},
+        {"radii from 1e-3 to 1e3", radii, 0},
+        {"words", words, 0},
+        {"about the eye", about_the_eye, 0},
+        {"ends", ends, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

@@ -111,7 +111,7 @@ static struct cells run(struct harness *h, struct setup *s, double open)
     struct pt_buffer *keys = harness_buffer(h, empty, count * 8), *merged = harness_buffer(h, unset, count * 16);
     struct pt_buffer *place = harness_buffer(h, unset, count * 16);
     struct pt_buffer *chunks = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
-    struct pt_buffer *positions = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+    struct pt_buffer *positions = points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots);
     struct pt_buffer *surfels = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->color_bytes);
     struct pt_buffer *opacities = s->opacities ? harness_buffer(h, s->opacities, (size_t)cloud->slots + 4) : NULL;
@@ -272,9 +272,16 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, harness_near(ref_merge(&args, points, 2, 2.0f, 0, 4, 4).place[3], 1.0, 1e-9));
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, perspective);
+    points_packed(h, orthographic);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
+        {"packed positions", packed, 0},
         {"sanity", sanity, 1},
         {"random points, perspective", perspective, 0},
         {"random points, orthographic", orthographic, 0},

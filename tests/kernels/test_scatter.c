@@ -23,7 +23,7 @@ static uint64_t *run_scatter(struct harness *h, struct scene *scene)
         struct cloud *cloud = &scene->clouds[i];
         points_pad(cloud);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
-        buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+        buffers[n++] = points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots);
         buffers[n++] = harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots);
     }
     struct scatter_args args = {.view = scene->view, .instances = scene->count, .behind = scene->limit != NULL};
@@ -628,9 +628,18 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, !ref_scatter(&view, &chunk, p, words, 0).possible);
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, perspective);
+    points_packed(h, orthographic);
+    points_packed(h, culling);
+    points_packed(h, sifted);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
+        {"packed positions", packed, 0},
         {"sanity", sanity, 1},
         {"random clouds, perspective", perspective, 0},
         {"random clouds, orthographic", orthographic, 0},

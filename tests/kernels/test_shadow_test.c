@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // shadow_test: points before, on and behind the surfaces of a map, with normals and without; what samples and maps add up to.
-#include "harness.h"
+#include "points.h"
 #include "shared/shadows.h"
 #include "shared/words.h"
 
@@ -82,6 +82,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
             place(rng, &s, c, i);
         }
     }
+    points_settle(s.chunks, CHUNKS, s.positions);
     return s;
 }
 
@@ -94,7 +95,7 @@ static void check(struct harness *h, const struct setup *s, uint32_t base, doubl
     struct pt_buffer *keys = harness_buffer(h, s->map.keys, count * 8), *from = harness_buffer(h, s->map.from, count * 4);
     struct pt_buffer *deff = harness_buffer(h, s->map.deff, count * 4);
     struct pt_buffer *chunks = harness_buffer(h, s->chunks, sizeof s->chunks);
-    struct pt_buffer *positions = harness_buffer(h, s->positions, SLOTS * 12);
+    struct pt_buffer *positions = points_positions(h, s->chunks, CHUNKS, s->positions, SLOTS);
     struct pt_buffer *surfels = harness_buffer(h, s->surfels, SLOTS * 4), *marks = harness_buffer(h, s->marks, SLOTS);
     struct pt_buffer *words = harness_buffer(h, s->words, (SLOTS + 7) * 4), *flag = harness_buffer(h, &differs, 4);
     struct pt_buffer *opacities = harness_buffer(h, s->opacities, count + 4);
@@ -338,9 +339,16 @@ static void two_ways(struct harness *h)
         }
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, maps);
+    points_packed(h, samples);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
+        {"packed positions", packed, 0},
         {"sanity", sanity, 1},
         {"two ways mark the same points", two_ways, 1},
         {"maps of all kinds", maps, 0},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // sift: boxes that keep and cut, planes, hidden classes, hidden shapes, masks, fields, scans; degenerate and huge ones. Bits are equal on every device.
-#include "harness.h"
+#include "points.h"
 #include "shared/points.h"
 
 #include <math.h>
@@ -41,6 +41,7 @@ static struct setup make(struct harness *h, struct rng *rng)
     s.shapes = harness_alloc(h, 4 * (size_t)s.slots);
     for (uint32_t i = 0; i < 3 * s.slots; i++)
         s.positions[i] = (float)rng_range(rng, -2.0, 2.0);
+    points_settle(s.chunks, CHUNKS, s.positions);
     for (uint32_t i = 0; i < s.slots; i++)
         s.classes[i] = (uint8_t)(rng_below(rng, 4) ? rng_below(rng, 8) : rng_below(rng, 256));
     for (uint32_t i = 0; i < s.slots; i++)
@@ -89,7 +90,7 @@ static void check(struct harness *h, const struct setup *s)
     uint32_t *before = harness_alloc(h, 4 * (size_t)(s->words + 1));
     memset(before, 0xAA, 4 * (size_t)(s->words + 1));
     struct pt_buffer *chunks = harness_buffer(h, s->chunks, sizeof s->chunks);
-    struct pt_buffer *positions = harness_buffer(h, s->positions, 12 * (size_t)s->slots);
+    struct pt_buffer *positions = points_positions(h, s->chunks, CHUNKS, s->positions, s->slots);
     struct pt_buffer *classes = harness_buffer(h, s->classes, (s->slots + 3) / 4 * 4);
     struct pt_buffer *clips = harness_buffer(h, s->clips, (s->clip_count ? s->clip_count : 1) * sizeof *s->clips);
     struct pt_buffer *drawn = harness_buffer(h, before, 4 * (size_t)(s->words + 1));
@@ -296,9 +297,12 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, field, NULL, clips, 1) == REF_NO);
 }
 
+static void packed(struct harness *h) { points_packed(h, shapes); }
+
 int main(int argc, char **argv)
 {
-    static const struct harness_case cases[] = {{"sanity", sanity, 1},
+    static const struct harness_case cases[] = {{"packed positions", packed, 0},
+                                                {"sanity", sanity, 1},
                                                 {"boxes and planes", shapes, 0},
                                                 {"hidden classes", classes, 0},
                                                 {"hidden shapes", shape_words, 0},

@@ -151,7 +151,7 @@ static void points(struct harness *h)
         const struct scatter_args args = {.view = scene.points.view, .instances = 1};
         HARNESS_RUN(h, scatter, &args, plane, NULL, NULL,
                     harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
-                    harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots),
+                    points_positions(h, cloud->chunks, cloud->chunk_count, cloud->positions, cloud->slots),
                     harness_buffer(h, cloud->surfels, 4 * (size_t)cloud->slots));
         const uint64_t *scattered = harness_read(h, plane);
         for (size_t i = 0; i < pixels; i++)
@@ -386,9 +386,17 @@ static void sanity(struct harness *h)
     }
 }
 
+static void packed(struct harness *h)
+{
+    points_packed(h, perspective);
+    points_packed(h, orthographic);
+    points_packed(h, large);
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
+        {"packed positions", packed, 0},
         {"sanity", sanity, 1},
         {"random discs, perspective", perspective, 0},
         {"random discs, orthographic", orthographic, 0},

@@ -37,7 +37,8 @@ static void copy_point(struct dealt *to, const struct pt_chunk *source, uint32_t
     const struct patina_cloud *from = to->from;
     const uint64_t slot = source->first + i, out = chunk->first + chunk->count;
     for (int k = 0; k < 3; k++) {
-        const double p = (double)from->positions[3 * (uint64_t)source->first + (uint64_t)k * source->padded + i];
+        const double p =
+            (double)((const float *)from->positions)[3 * (uint64_t)source->first + (uint64_t)k * source->padded + i];
         place[chunk->count][k] = (float)(p + (source->origin[k] - chunk->origin[k]));
     }
     to->order[out] = from->order[slot];
@@ -122,7 +123,7 @@ static void replace(void **array, uint64_t old_bytes, void *dealt, uint64_t byte
 static void take_over(patina_cloud *cloud, struct dealt *to)
 {
     const uint64_t old = cloud->slots, slots = to->slots;
-    replace((void **)&cloud->positions, old * 12, to->positions, slots * 12);
+    replace(&cloud->positions, old * 12, to->positions, slots * 12);
     replace((void **)&cloud->order, old * 4, to->order, slots * 4);
     replace((void **)&cloud->surfels, old * 4, to->surfels, slots * 4);
     replace((void **)&cloud->shapes, old * 4, to->shapes, slots * 4);

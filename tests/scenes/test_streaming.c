@@ -2,6 +2,7 @@
 // Clouds in files under a cap so small that every picture takes ten rounds or more: bytes equal to those without one (SPEC 13); and
 // graphics memory that is smaller than clouds.
 #include "clouds.h"
+#include "packed.h"
 #include "support.h"
 
 #include <stdio.h>
@@ -13,6 +14,9 @@ enum { POINTS = 120000, WIDTH = 200, HEIGHT = 150, LEAST_ROUNDS = 10, SHARE = 60
 enum { CAP_OF_COPIES = 360000 }; // two ranges of at least a chunk
 
 static char path[] = "/tmp/patina-streaming-XXXXXX", path_of_glass[] = "/tmp/patina-streaming-XXXXXX";
+// The same with positions that are packed, and with floats where these lie.
+static char packed[2][32] = {"/tmp/patina-streaming-XXXXXX", "/tmp/patina-streaming-XXXXXX"};
+static char rounded[2][32] = {"/tmp/patina-streaming-XXXXXX", "/tmp/patina-streaming-XXXXXX"};
 
 // What a picture is of; everything zero: one torus, as settings have it.
 struct look {
@@ -82,18 +86,28 @@ static void save(char *to, int faint)
     free(classes);
 }
 
+static void pack(const char *from, char *to, char *to_floats)
+{
+    if (close(mkstemp(to)) || close(mkstemp(to_floats)))
+        support_die("no temporary file");
+    packed_write(from, to, to_floats);
+}
+
 static int make_files(void **state)
 {
     (void)state;
     save(path, 0);
     save(path_of_glass, 1);
+    pack(path, packed[0], rounded[0]);
+    pack(path_of_glass, packed[1], rounded[1]);
     return 0;
 }
 
 static int remove_files(void **state)
 {
     (void)state;
-    return remove(path) | remove(path_of_glass);
+    return remove(path) | remove(path_of_glass) | remove(packed[0]) | remove(packed[1]) | remove(rounded[0]) |
+           remove(rounded[1]);
 }
 
 // ---- the pictures --------------------------------------------------------------------------------------------------------
@@ -152,11 +166,11 @@ static void add_clouds(struct stage *stage, const struct look *look)
     }
 }
 
-static struct stage build(const struct look *look)
+static struct stage build_of(const struct look *look, const char *file)
 {
     struct stage stage = {.settings = settings_default(WIDTH, HEIGHT)};
     const double eye[3] = {3.5, -4.5, 3.5}, target[3] = {0, 0, 0};
-    CHECK(patina_cloud_open(look->glass == 2 ? path_of_glass : path, &stage.cloud), NULL);
+    CHECK(patina_cloud_open(file, &stage.cloud), NULL);
     CHECK(patina_scene_create(&stage.scene), NULL);
     add_clouds(&stage, look);
     add_lights(stage.scene, look->lights);
@@ -192,6 +206,8 @@ static struct stage build(const struct look *look)
     CHECK(patina_scene_set_settings(stage.scene, s), stage.scene);
     return stage;
 }
+
+static struct stage build(const struct look *look) { return build_of(look, look->glass == 2 ? path_of_glass : path); }
 
 static void destroy(struct stage *stage)
 {
@@ -273,6 +289,45 @@ static void test_same_bytes(void **state)
             struct look look = looks[i];
             look.thin = devices[1] != NULL;
             compare(name, &look, i % 3, devices[1] ? devices : NULL);
+        }
+        patina_device_destroy(devices[1]);
+        patina_device_destroy(device);
+    }
+}
+
+// Packed positions, whole and in rounds, show what floats at their places do.
+static void compare_packed(patina_device *const devices[2], const char *name, const struct look *look)
+{
+    const int glass = look->glass == 2;
+    struct stage floats = build_of(look, rounded[glass]), stage = build_of(look, packed[glass]);
+    patina_frame_stats float_stats, stats;
+    struct picture wanted = draw(devices[0], &floats, &float_stats), whole = draw(devices[0], &stage, &stats);
+    picture_assert_identical(&whole, &wanted, 0, 0, look->name);
+    assert_true(stats.mapped_bytes + 4 * POINTS <= float_stats.mapped_bytes);
+    struct picture capped = draw(devices[1], &stage, &stats);
+    picture_assert_identical(&capped, &wanted, 0, 0, look->name);
+    printf("  %s, %s, packed: %u rounds, given back %u times, %.2f MB read\n", name, look->name, stats.mapped_rounds,
+           stats.mapped_returned, 1e-6 * (double)stats.mapped_read);
+    assert_true(stats.mapped_rounds >= LEAST_ROUNDS / 2 || stats.mapped_returned >= LEAST_ROUNDS / 2);
+    picture_free(&capped);
+    picture_free(&whole);
+    picture_free(&wanted);
+    destroy(&stage);
+    destroy(&floats);
+}
+
+static void test_packed(void **state)
+{
+    (void)state;
+    for (uint32_t k = 0; k < support_device_count(); k++) {
+        const char *name = support_device_name(k);
+        const int level = !strncmp(name, "cpu-", 4);
+        patina_device *device = support_device_open(name, 0, 0);
+        patina_device *devices[2] = {device, device ? open_device(name, support_is_gl(name) ? CAP_OF_COPIES : 50000, 0) : NULL};
+        for (uint32_t i = 0; i < sizeof looks / sizeof *looks && device; i += level ? 5 : 1) {
+            struct look look = looks[i];
+            look.thin = support_is_gl(name);
+            compare_packed(devices, name, &look);
         }
         patina_device_destroy(devices[1]);
         patina_device_destroy(device);
@@ -419,8 +474,8 @@ static void test_own_memory(void **state)
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_again),
-                                       cmocka_unit_test(test_changed_colors), cmocka_unit_test(test_too_small),
-                                       cmocka_unit_test(test_own_memory)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_packed),
+                                       cmocka_unit_test(test_again),      cmocka_unit_test(test_changed_colors),
+                                       cmocka_unit_test(test_too_small),  cmocka_unit_test(test_own_memory)};
     return cmocka_run_group_tests(tests, make_files, remove_files);
 }

@@ -157,7 +157,7 @@ static void add_points(struct town *town, const struct level *level, const uint3
     for (uint64_t i = 3 * first; i < 3 * level->slot_end; i++) // of 256ths, another tone a quarter
         town->colors[i - 3 * first] =
             (uint8_t)(((const uint8_t *)from->colors)[i] * (200 + (place[0] * 7 + place[1] * (5 + i % 3)) % 56) >> 8);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, from->positions + 3 * first, slots * 12);
+    pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, (const float *)from->positions + 3 * first, slots * 12);
     pt_cloud_writer_add(town->writer, PT_ARRAY_ORDER, town->order, slots * 4);
     pt_cloud_writer_add(town->writer, PT_ARRAY_SURFELS, from->surfels + first, slots * 4);
     pt_cloud_writer_add(town->writer, PT_ARRAY_COLORS, town->colors, slots * 3);

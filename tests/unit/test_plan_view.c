@@ -137,7 +137,7 @@ static void test_places_hold_points(void **state)
         for (uint32_t n = 0; n < plan.instance_count; n++)
             for (uint32_t c = 0; c < plan.instances[n].chunk_count; c++) {
                 const struct chunk_view *chunk = &plan.instances[n].chunks[c];
-                const float *p = cloud->positions + 3 * (size_t)chunk->first;
+                const float *p = (const float *)cloud->positions + 3 * (size_t)chunk->first;
                 assert_true(chunk->column_first < chunk->column_end && chunk->column_end <= plan.view.width);
                 assert_true(chunk->row_first < chunk->row_end && chunk->row_end <= plan.view.height);
                 known += chunk->z_least > 0.0f;

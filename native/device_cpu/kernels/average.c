@@ -114,7 +114,7 @@ static void project(const struct average *average, const struct band *band, cons
                     uint32_t last, struct blocks *out)
 {
     const struct view_args *view = &average->args->view;
-    const float *positions = (const float *)PT_DATA(average->call, average, positions) + 3 * (size_t)chunk->first;
+    const uint32_t *points = pt_chunk_points(PT_DATA(average->call, average, positions), chunk);
     const uint32_t *surfels = (const uint32_t *)PT_DATA(average->call, average, surfels) + chunk->first;
     const uint32_t *drawn = average->args->sifted ? PT_DATA(average->call, average, drawn) : NULL;
     const float below = (float)(view->origin_y + (int32_t)band->first) - PT_AVERAGE_WIDEST - 1.0f;
@@ -125,7 +125,7 @@ static void project(const struct average *average, const struct band *band, cons
     out->narrow.count = out->middle.count = out->wide.count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
         vf p[3], at[3];
-        pt_load_points(positions, chunk->padded, i, p);
+        pt_load_points(chunk, points, i, p);
         pt_project(view, chunk, p, at);
         vm some = vm_and(pt_within(&window, at), vm_first(pt_lanes_left(i, last)));
         if (!vm_bits(some))

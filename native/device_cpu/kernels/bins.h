@@ -73,8 +73,7 @@ static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, ui
     return (struct pt_disc_source){bins->view,
                                    &bins->discs[*instance],
                                    view,
-                                   (const float *)pt_bin_data(bins, PT_BUF_splat_positions, *instance) +
-                                       3 * (size_t)view->first,
+                                   pt_chunk_points(pt_bin_data(bins, PT_BUF_splat_positions, *instance), view),
                                    (const uint32_t *)pt_bin_data(bins, PT_BUF_splat_surfels, *instance) + view->first,
                                    pt_bin_data(bins, PT_BUF_splat_radii, *instance)};
 }
@@ -174,7 +173,7 @@ static void pt_bin_chunk(struct pt_bins *bins, uint32_t thread, const struct pt_
     for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
         struct pt_discs discs;
         vf p[3];
-        pt_load_points(source->positions, chunk->padded, i, p);
+        pt_load_points(chunk, source->points, i, p);
         pt_disc_project(source, p, vm_first(pt_lanes_left(i, chunk->count)), &discs);
         discs.id = vi_add(vi_set(chunk->first + i), vi_lanes());
         vi word = vi_load(source->surfels + i);
@@ -216,10 +215,12 @@ static inline void pt_bin_sort(struct pt_bins *bins)
     for (uint32_t c = 0; c < count; c++) {
         const struct pt_disc_source source = pt_bin_source(bins, c, &instance);
         const struct chunk_view *chunk = source.chunk;
-        const float *r = chunk->row + 6, *p = source.positions;
-        const float z = chunk->count
-                            ? r[0] * p[0] + r[1] * p[chunk->padded] + r[2] * p[2 * (size_t)chunk->padded] + chunk->hi[2]
-                            : 0.0f;
+        const float *r = chunk->row + 6;
+        float p[3], z = 0.0f;
+        if (chunk->count) {
+            pt_load_point(chunk, source.points, 0, p);
+            z = r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + chunk->hi[2];
+        }
         bins->order[c] = (uint64_t)(z > 0.0f ? pt_bits(z) : 0) << 32 | c;
         if (c % 16 == 0)
             pt_pool_look(bins->call->pool);

@@ -35,7 +35,7 @@ struct pt_cell_block { // of a chunk: its points in view that do not face away a
 struct pt_cells {
     const struct pt_cpu_call *call;
     const struct view_args *view;
-    const float *positions;
+    const void *positions;
     const uint32_t *surfels, *drawn; // drawn NULL: nothing is sifted
     const struct chunk_view *chunks;
     uint32_t chunk_count;
@@ -62,14 +62,14 @@ static inline void pt_cells_project(const struct pt_cells *cells, const struct p
                                     const struct chunk_view *chunk, uint32_t first, uint32_t last, struct pt_cell_block *block)
 {
     const struct view_args *view = cells->view;
-    const float *positions = cells->positions + 3 * (size_t)chunk->first;
+    const uint32_t *points = pt_chunk_points(cells->positions, chunk);
     const uint32_t *surfels = cells->surfels + chunk->first, *drawn = cells->drawn;
     const struct pt_window window = pt_window_rows(view, (float)(view->origin_y + (int32_t)band->first),
                                                    (float)(view->origin_y + (int32_t)band->end));
     uint32_t count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
         vf p[3], at[3];
-        pt_load_points(positions, chunk->padded, i, p);
+        pt_load_points(chunk, points, i, p);
         pt_project_rows(view, chunk, p, at);
         const vm own = vm_and(vf_le(window.bottom, at[1]), vf_lt(at[1], window.top));
         if (!vm_bits(own)) // most chunks lie in several bands, whose points lie side by side

@@ -4,8 +4,8 @@
 // Pixel by pixel, for there may be many more points: each is looked up by its number, and projected as scatter does it. Of 16
 // points a pixel in a fourth of the time that all of them take.
 #include "device_cpu/cpu.h"
+#include "device_cpu/points.h"
 #include "device_cpu/rows.h"
-#include "device_cpu/vector_math.h"
 #include "shared/measured.h"
 
 enum { BLOCK = 256 }; // pixels of a row
@@ -59,7 +59,7 @@ static inline float transform(const struct chunk_view *chunk, int row, float x, 
 static void project(const struct center *center, struct measured *measured)
 {
     const struct chunk_view *chunks = PT_DATA(center->call, center, chunks);
-    const float *positions = PT_DATA(center->call, center, positions);
+    const void *positions = PT_DATA(center->call, center, positions);
     uint32_t near = 0, kept = 0;
     for (uint32_t i = 0; i < measured->count; i++) {
         near = find_start(center, measured->id[i], near);
@@ -67,12 +67,12 @@ static void project(const struct center *center, struct measured *measured)
         const uint32_t slot = measured->id[i] - center->starts[near].id;
         if (slot >= chunk->count)
             continue;
-        const float *p = positions + 3 * (size_t)chunk->first + slot;
-        const float x = p[0], y = p[chunk->padded], z = p[2 * (size_t)chunk->padded];
+        float p[3];
+        pt_load_point(chunk, pt_chunk_points(positions, chunk), slot, p);
         measured->column[kept] = measured->column[i];
         measured->z[kept] = measured->z[i];
-        measured->x[kept] = transform(chunk, 0, x, y, z);
-        measured->y[kept++] = transform(chunk, 1, x, y, z);
+        measured->x[kept] = transform(chunk, 0, p[0], p[1], p[2]);
+        measured->y[kept++] = transform(chunk, 1, p[0], p[1], p[2]);
     }
     measured->count = kept;
 }

@@ -27,13 +27,13 @@ static inline vf texel_at(const struct dim *dim, vi column, vi row, vi slab, vf 
 static inline vf clamped(vf x, uint32_t most) { return vf_min(vf_max(x, vf_zero()), vf_set((float)most)); }
 
 // What is taken of 255 from PT_LANES points from slot i on.
-static inline vi loss_of(const struct dim *dim, const struct chunk_view *chunk, const float *positions, uint32_t i, vm lanes)
+static inline vi loss_of(const struct dim *dim, const struct chunk_view *chunk, const uint32_t *points, uint32_t i, vm lanes)
 {
     const struct dim_args *args = dim->args;
     const struct view_args *view = &args->view;
     const vf one = vf_set(1.0f), half = vf_set(0.5f);
     vf p[3], at[3];
-    pt_load_points(positions, chunk->padded, i, p);
+    pt_load_points(chunk, points, i, p);
     // 1. project
     pt_project(view, chunk, p, at);
     const vm inside = pt_in_window(view, args->window, at, lanes);
@@ -63,7 +63,7 @@ static inline vi loss_of(const struct dim *dim, const struct chunk_view *chunk, 
 static uint32_t dim_chunk(const struct dim *dim, const struct chunk_view *chunk)
 {
     const struct dim_args *args = dim->args;
-    const float *positions = (const float *)PT_DATA(dim->call, dim, positions) + 3 * (size_t)chunk->first;
+    const uint32_t *points = pt_chunk_points(PT_DATA(dim->call, dim, positions), chunk);
     const uint8_t *marks = PT_DATA(dim->call, dim, marks); // none where none are asked for
     uint32_t *words = (uint32_t *)PT_DATA(dim->call, dim, shadows) + args->base + chunk->first, differs = 0;
     const int whole = args->alone || args->close, all = args->close || args->compare;
@@ -74,7 +74,7 @@ static uint32_t dim_chunk(const struct dim *dim, const struct chunk_view *chunk)
         if (!vm_bits(lanes))
             continue;
         uint32_t losses[PT_LANES];
-        vi_store(losses, loss_of(dim, chunk, positions, i, lanes));
+        vi_store(losses, loss_of(dim, chunk, points, i, lanes));
         for (uint32_t left = vm_bits(lanes); left; left &= left - 1) {
             const uint32_t k = (uint32_t)__builtin_ctz(left);
             if (all || losses[k])

@@ -34,7 +34,7 @@ struct pt_disc_source {
     const struct view_args *view;
     const struct disc_args *args;
     const struct chunk_view *chunk;
-    const float *positions;  // of the chunk
+    const uint32_t *points;  // of the chunk
     const uint32_t *surfels; // of the chunk
     const void *radii;       // floats or shape words
 };

@@ -33,9 +33,8 @@ static inline void place(const struct gather *gather, const struct chunk_view *c
 {
     const struct gather_args *args = gather->args;
     const struct view_args *view = &args->shade.view;
-    const float *positions = (const float *)PT_DATA(gather->call, gather, positions) + 3 * (size_t)chunk->first;
-    const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                     vf_load(positions + 2 * (size_t)chunk->padded + i)};
+    vf p[3];
+    pt_load_points(chunk, pt_chunk_points(PT_DATA(gather->call, gather, positions), chunk), i, p);
     const vf farthest = vf_set(PT_SOFT_FARTHEST), near = vf_set(view->z_near), far = vf_set(view->z_far);
     out->x = vf_transform(chunk, 0, p[0], p[1], p[2]);
     out->y = vf_transform(chunk, 1, p[0], p[1], p[2]);

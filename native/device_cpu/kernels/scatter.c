@@ -74,14 +74,16 @@ static struct window window_of(const struct view_args *view)
 }
 
 // 1. Pixels and depths of points [first, last). What their pixels hold is asked for: a chunk's first points find it in memory.
-static inline void project(const struct view_args *view, const struct window *w, struct target target,
-                           const struct chunk_view *chunk, const float *positions, const uint32_t *surfels, uint32_t first,
-                           uint32_t last, struct block *block)
+// Written once for packed ones and once for others: of these it takes as many instructions as if there were no packed ones, not 4 % more.
+static inline __attribute__((always_inline)) void project(int packed, const struct view_args *view, const struct window *w,
+                                                          struct target target, const struct chunk_view *chunk,
+                                                          const uint32_t *points, const uint32_t *surfels, uint32_t first,
+                                                          uint32_t last, struct block *block)
 {
     uint32_t count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
         vf p[3], at[3];
-        pt_load_points(positions, chunk->padded, i, p);
+        pt_load_points_as(packed, chunk, points, i, p);
         pt_project(view, chunk, p, at);
         vm inside = pt_keep_drawn(chunk, target.drawn, i, pt_within(&w->window, at));
         if (chunk->cull)
@@ -153,13 +155,16 @@ static void walk_chunk(const struct scatter *scatter, uint32_t c, struct walk *w
     const struct chunk_view *chunk = chunk_at(scatter, c, &walk->instance);
     if (pt_is_hidden(chunk, &scatter->tiles))
         return;
-    const float *positions = (const float *)PT_DATA_EACH(scatter->call, scatter, positions, walk->instance) +
-                             3 * (size_t)chunk->first;
+    const struct view_args *view = &scatter->args->view;
+    const uint32_t *points = pt_chunk_points(PT_DATA_EACH(scatter->call, scatter, positions, walk->instance), chunk);
     const uint32_t *surfels = (const uint32_t *)PT_DATA_EACH(scatter->call, scatter, surfels, walk->instance) + chunk->first;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK, walk->count++) {
         const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
-        project(&scatter->args->view, &walk->window, walk->target, chunk, positions, surfels, first, last,
-                &walk->blocks[walk->count % 2]);
+        struct block *block = &walk->blocks[walk->count % 2];
+        if (chunk->step > 0.0f)
+            project(1, view, &walk->window, walk->target, chunk, points, surfels, first, last, block);
+        else
+            project(0, view, &walk->window, walk->target, chunk, points, surfels, first, last, block);
         if (walk->count)
             put(walk->target, &walk->blocks[(walk->count - 1) % 2]);
     }

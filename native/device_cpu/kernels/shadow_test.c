@@ -184,7 +184,7 @@ static struct fall queued(const struct queue *queue, uint32_t i, vm lanes)
 }
 
 // Queues those of BLOCK slots from `first` on that have to be tested, or looked at in any case.
-static void fill_queue(const struct shadow_test *test, const struct chunk_view *chunk, const float *positions, uint32_t first,
+static void fill_queue(const struct shadow_test *test, const struct chunk_view *chunk, const uint32_t *points, uint32_t first,
                        struct queue *queue)
 {
     const struct shadow_test_args *args = &test->args;
@@ -198,7 +198,7 @@ static void fill_queue(const struct shadow_test *test, const struct chunk_view *
         if (!vm_bits(lanes))
             continue;
         vf p[3];
-        pt_load_points(positions, chunk->padded, i, p);
+        pt_load_points(chunk, points, i, p);
         const struct fall fall = fall_of(test, chunk, p, lanes);
         const uint32_t wanted = vm_bits(args->close || args->compare ? lanes : fall.behind); // lit ones too, to look at
         if (wanted)
@@ -227,11 +227,11 @@ static uint32_t test_points(const struct shadow_test *test, const struct chunk_v
 
 static uint32_t test_chunk(const struct shadow_test *test, const struct chunk_view *chunk)
 {
-    const float *positions = (const float *)PT_DATA(test->call, shadow_test, positions) + 3 * (size_t)chunk->first;
+    const uint32_t *points = pt_chunk_points(PT_DATA(test->call, shadow_test, positions), chunk);
     uint32_t differs = 0;
     struct queue queue;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
-        fill_queue(test, chunk, positions, first, &queue);
+        fill_queue(test, chunk, points, first, &queue);
         for (uint32_t at = 0; at < queue.count; at += PT_LANES)
             differs |= test_points(test, chunk, &queue, at);
     }

@@ -26,14 +26,14 @@ static inline vm inside(const struct clip_view *clip, const vf p[3])
 }
 
 // Which of PT_LANES points from slot i of the chunk on.
-static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, const float *positions, uint32_t i)
+static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, const uint32_t *points, uint32_t i)
 {
     const struct sift_args *args = sift->call->arguments;
     vm keep = vm_of_bits(chunk->clip_keeps ? 0u : ~0u), cut = vm_of_bits(0);
     if (chunk->clip_count) { // else positions need not come from memory, and there may be no clips
         const struct clip_view *clips = (const struct clip_view *)PT_DATA(sift->call, sift, clips) + chunk->clip_first;
         vf p[3];
-        pt_load_points(positions, chunk->padded, i, p);
+        pt_load_points(chunk, points, i, p);
         for (uint32_t k = 0; k < chunk->clip_keeps; k++)
             keep = vm_or(keep, inside(&clips[k], p));
         for (uint32_t k = chunk->clip_keeps; k < chunk->clip_count; k++)
@@ -73,7 +73,7 @@ static void sift_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(sift->call); c++) {
         const struct chunk_view *chunk = &chunks[c];
-        const float *positions = (const float *)PT_DATA(sift->call, sift, positions) + 3 * (size_t)chunk->first;
+        const uint32_t *points = pt_chunk_points(PT_DATA(sift->call, sift, positions), chunk);
         uint32_t *words = (uint32_t *)PT_DATA(sift->call, sift, drawn) + chunk->sifted - 1;
         const uint32_t *mask = args->by_mask
                                    ? (const uint32_t *)PT_DATA(sift->call, sift, mask) + chunk->first / PT_SLOTS_A_WORD
@@ -81,7 +81,7 @@ static void sift_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         for (uint32_t first = 0; first < chunk->count && chunk->sifted; first += PT_SLOTS_A_WORD) {
             uint32_t word = 0;
             for (uint32_t i = 0; i < PT_SLOTS_A_WORD; i += PT_LANES)
-                word |= drawn(sift, chunk, positions, first + i) << i;
+                word |= drawn(sift, chunk, points, first + i) << i;
             words[first / PT_SLOTS_A_WORD] = mask ? word & ~mask[first / PT_SLOTS_A_WORD] : word;
         }
     }

@@ -207,6 +207,9 @@ typedef struct patina_cloud_info {
     uint64_t estimated_normals; // of points whose normal the analysis found
     uint64_t kinds[6];          // drawn points of each patina_kind
     uint64_t seen_through;      // drawn points that some station saw through: patina_analysis_desc.free_space
+    uint32_t packed;            // 1: of a file that was saved so: patina_save_desc.pack
+    uint32_t numbered;          // 1: points are numbered as the file has them: patina_save_desc.drop_order
+    double packed_error;        // how far a packed position lies at most from where it was given, object units
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -299,6 +302,19 @@ PATINA_API int patina_cloud_neighbourhoods(const patina_cloud *cloud, const pati
 // cloud is open its file may be replaced (patina_cloud_save does), not written into. A cloud of a file with damaged pages is not saved
 // (PATINA_ERROR_FORMAT, which names them): they would pass as good.
 PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
+// The same, smaller where that is asked for; desc may be NULL. What is packed or numbered anew stays so when it is saved again.
+typedef struct patina_save_desc {
+    size_t struct_size;
+    uint32_t
+        pack; // 1 = positions take 8 bytes a point in place of 12: a chunk's lie on a grid of 2^21 places across, whose spacing
+              // is a power of two, and move to its nearest place, by 2^-21 of half the chunk's box or twice that along an axis.
+              // info.packed_error says by how much at most. Pictures are exactly those of the points where they lie then. An
+              // order that numbers points as they lie is left out
+    uint32_t
+        drop_order; // 1 = 4 bytes a point less: points are numbered anew, as they lie in the file, from 0 to info.drawn - 1; what
+                    // has no place is none of them. Arrays that belong to the numbers of before fit no longer
+} patina_save_desc;
+PATINA_API int patina_cloud_save_as(const patina_cloud *cloud, const char *path, const patina_save_desc *desc);
 PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
 // Reads a saved cloud whole and compares the sum of each of its sections with that of the writing, which opening leaves out but
 // for the chunks: PATINA_ERROR_FORMAT where any differs. progress: may be NULL; stops it too. Any thread, open clouds or not.
