@@ -191,6 +191,35 @@ static int analyse(struct job *job)
     return code ? fail(job, job->build->in, NULL, code) : TOOL_OK;
 }
 
+static int is_smaller(const struct tool_build *build) { return build->pack || build->drop_order; }
+
+// A saved cloud becomes the one that is asked for, smaller where that is, in its own place too.
+static int save_as(const struct job *job, const char *from)
+{
+    const patina_save_desc desc = {
+        .struct_size = sizeof desc, .pack = (uint32_t)job->build->pack, .drop_order = (uint32_t)job->build->drop_order};
+    patina_cloud_info info = {.struct_size = sizeof info};
+    patina_cloud *cloud = NULL;
+    int code = patina_cloud_open(from, &cloud), result = TOOL_OK;
+    if (!code)
+        code = patina_cloud_save_as(cloud, job->build->out, &desc);
+    if (code)
+        result = fail(job, from, cloud, code);
+    patina_cloud_destroy(cloud);
+    if (code || !desc.pack)
+        return result;
+    cloud = NULL;
+    code = patina_cloud_open(job->build->out, &cloud);
+    if (!code)
+        code = patina_cloud_get_info(cloud, &info);
+    if (code)
+        result = fail(job, job->build->out, cloud, code);
+    else
+        tool_say("note: positions are packed, and lie at most %.3g from where %s has them", info.packed_error, job->build->in);
+    patina_cloud_destroy(cloud);
+    return result;
+}
+
 static int finish_cloud(struct job *job)
 {
     patina_cloud_info info = {.struct_size = sizeof info};
@@ -202,12 +231,13 @@ static int finish_cloud(struct job *job)
         tool_say("note: %llu points of %s are nowhere, and are not drawn: a coordinate is no finite number",
                  (unsigned long long)info.invalid_positions, job->build->in);
     const int analysed = job->build->unanalysed || info.has_shapes; // or not to be
-    if (!code && analysed)
-        code = patina_cloud_save(cloud, job->build->out);
     if (code)
         result = fail(job, job->place, cloud, code);
     patina_cloud_destroy(cloud);
-    return result || analysed ? result : analyse(job);
+    if (!result && analysed)
+        return save_as(job, job->place);
+    result = result ? result : analyse(job);
+    return result || !is_smaller(job->build) ? result : save_as(job, job->build->out);
 }
 
 static char *beside(const char *path)
@@ -237,6 +267,8 @@ static int convert(struct job *job)
         result = finish_cloud(job);
         if (own)
             pt_file_remove(own);
+    } else if (!result && is_smaller(build)) {
+        result = save_as(job, build->out);
     }
     free(own);
     return result;

@@ -55,7 +55,8 @@ static int parse_options(int count, char **arguments, struct tool_build *build)
 {
     for (int i = 0; i < count; i += 2) {
         const char *name = arguments[i], *value = i + 1 < count ? arguments[i + 1] : NULL;
-        if (strcmp(name, "--attribute") != 0 && strcmp(name, "--memory") != 0 && strcmp(name, "--analysis") != 0)
+        if (strcmp(name, "--attribute") != 0 && strcmp(name, "--memory") != 0 && strcmp(name, "--analysis") != 0 &&
+            strcmp(name, "--pack") != 0 && strcmp(name, "--order") != 0)
             return tool_misuse("convert: there is no option '%s'", name);
         if (!value)
             return tool_misuse("%s: a value, please", name);
@@ -64,6 +65,12 @@ static int parse_options(int count, char **arguments, struct tool_build *build)
             build->attribute = value;
         } else if (!strcmp(name, "--memory")) {
             bad = tool_parse_memory(value, &build->memory);
+        } else if (!strcmp(name, "--pack")) {
+            build->pack = !strcmp(value, "on");
+            bad = !build->pack && strcmp(value, "off") != 0;
+        } else if (!strcmp(name, "--order")) {
+            build->drop_order = !strcmp(value, "drop");
+            bad = !build->drop_order && strcmp(value, "keep") != 0;
         } else {
             build->unanalysed = !strcmp(value, "off");
             bad = !build->unanalysed && strcmp(value, "on") != 0;

@@ -74,10 +74,42 @@ static void print_cloud(const patina_cloud_info *info)
     printf("\n");
 }
 
+static int info_of_saved(const char *path)
+{
+    patina_cloud_info info = {.struct_size = sizeof info};
+    patina_cloud *cloud = NULL;
+    int code = patina_cloud_open(path, &cloud);
+    if (!code)
+        code = patina_cloud_get_info(cloud, &info);
+    if (code) {
+        const int result = tool_failed(path, cloud, code);
+        patina_cloud_destroy(cloud);
+        return result;
+    }
+    printf("format      saved cloud\n");
+    printf("points      %llu%s\n", (unsigned long long)info.count, info.numbered ? ", numbered as they lie" : "");
+    if (info.packed)
+        printf("positions   packed, at most %.3g from where they were given\n", info.packed_error);
+    else
+        printf("positions   float32 a chunk\n");
+    if (info.box_min[0] <= info.box_max[0]) {
+        printf("box         %.9g %.9g %.9g\n", info.box_min[0], info.box_min[1], info.box_min[2]);
+        printf("            %.9g %.9g %.9g\n", info.box_max[0], info.box_max[1], info.box_max[2]);
+    }
+    printf("normals     %s\n", info.has_normals ? "yes" : "no");
+    printf("colours     %s\n", info.has_colors ? "yes" : "no");
+    printf("analysed    %s\n", info.has_shapes ? "yes" : "no");
+    print_cloud(&info);
+    patina_cloud_destroy(cloud);
+    return TOOL_OK;
+}
+
 int tool_info(int count, char **arguments)
 {
     if (count != 1)
         return tool_misuse("info: one file, please");
+    if (tool_begins(arguments[0], "patina\n\x1a", 8))
+        return info_of_saved(arguments[0]);
     patina_progress *progress = NULL;
     patina_file *file = NULL;
     patina_cloud *cloud = NULL;

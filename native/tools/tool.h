@@ -154,7 +154,7 @@ int tool_begins(const char *path, const char *bytes, size_t size);
 struct tool_build {
     const char *in, *out, *attribute; // attribute: NULL: none
     uint64_t memory;                  // bytes; 0: automatic
-    int unanalysed;
+    int unanalysed, pack, drop_order;
 };
 int tool_convert_to_cloud(const struct tool_build *build); // a tool_exit
 

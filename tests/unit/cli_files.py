@@ -122,6 +122,29 @@ def left(*names):
     return sorted(path.name for path in cli.FOLDER.glob("*out.cloud*") if path.name not in names)
 
 
+def packs(plain):
+    """b.ply smaller, at one go or from what was saved: what it may be off by is told, and tiny."""
+    said = cli.run("convert", "b.ply", "small.cloud", "--pack", "on").stderr
+    off = float(said.split("lie at most ")[1].split()[0])
+    assert 0 < off < 3e-6 and "from where b.ply has them" in said, said
+    told = cli.run("info", "small.cloud").stdout
+    assert f"positions   packed, at most {off:.3g} from" in told and "points      15000\n" in told and "analysed    yes" in told, told
+    small = (cli.FOLDER / "small.cloud").read_bytes()
+    cli.run("convert", "out.cloud", "again.cloud", "--pack", "on")
+    assert (cli.FOLDER / "again.cloud").read_bytes() == small
+    cli.run("convert", "small.cloud", "again.cloud")
+    assert (cli.FOLDER / "again.cloud").read_bytes() == small, "it stays packed"
+    cli.run("convert", "small.cloud", "small.cloud", "--order", "drop")
+    told = cli.run("info", "small.cloud").stdout
+    assert "points      15000, numbered as they lie" in told and "packed, at most" in told, told
+    sizes = len(plain), len(small), (cli.FOLDER / "small.cloud").stat().st_size
+    assert sizes[0] > sizes[1] > sizes[2], sizes
+    cli.run("render", "small.cloud", "-o", "small.png", "--size", "64x64")
+    assert "float32" in cli.run("info", "out.cloud").stdout
+    cli.run("convert", "bare.cloud", "bare2.cloud", "--analysis", "off", "--order", "drop")
+    assert "analysed    no" in cli.run("info", "bare2.cloud").stdout
+
+
 def test_convert_to_a_cloud():
     """The same bytes whatever memory it may take, from text and bytes alike, with an attribute or analysis or not; it renders as its file."""
     places = [(i % 150 * 0.01, i // 150 * 0.01, 0.1 * (i % 7)) for i in range(15000)]
@@ -151,8 +174,9 @@ def test_convert_to_a_cloud():
     assert (cli.FOLDER / "again.cloud").read_bytes() == wanted, "a saved cloud is analysed"
     cli.run("convert", "out.cloud", "again.cloud")
     assert (cli.FOLDER / "again.cloud").read_bytes() == wanted, "an analysed cloud stays as it is"
+    packs(wanted)
     assert "a saved cloud" in cli.run("convert", "bare.cloud", "no.cloud", "--attribute", "heat", code=2).stderr
-    for bad in (["--memory", "x"], ["--analysis", "grid"], ["--analysis", "auto"], ["--memory"], ["--colour", "1"]):
+    for bad in (["--memory", "x"], ["--analysis", "grid"], ["--analysis", "auto"], ["--memory"], ["--colour", "1"], ["--pack", "yes"], ["--order", "on"]):
         cli.run("convert", "b.ply", "no.cloud", *bad, code=2)
     assert "goes into a .cloud" in cli.run("convert", "b.ply", "no.ply", "--memory", "1G", code=2).stderr
     assert not (cli.FOLDER / "no.cloud").exists() and not (cli.FOLDER / "no.ply").exists()
