@@ -17,7 +17,7 @@ of them, in the same order; "absent" what could not be measured, and why.
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
 scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
-(ten minutes of work in Blender), analysis (what every point knows, 10 million), files (a town of 100 million points under a cap, 2.7 GB
+(ten minutes of work in Blender), analysis (what every point knows, 10 million), files (a town of 100 million points under a cap, 1.9 GB
 on the disk), walk (frame by frame
 through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs), soft (soft points in the sizes
 of [S Table 1], its models and orders, and against OSPRay), platforms (Blender's start with the add-on, sizes of packages, instructions of NEON's inner

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clouds in files, larger than what a picture may hold of them: a terraced town with trees, written as a saved cloud (town.c, 27 bytes a
+"""Clouds in files, larger than what a picture may hold of them: a terraced town with trees, written as a saved cloud (town.c, 19 bytes a
 point). Each picture is a run of the command line of its own, from a disk that holds nothing of the file in memory, and again.
 
     build/out/venv/bin/python tests/bench/files.py [--across N] [--folder FOLDER] [--library FILE] [--levels]
 
---across: quarters a side, of a million points each: 3, 10; 32 is a billion, and 28 GB on the disk. --levels: the town lies in levels, and
+--across: quarters a side, of a million points each: 3, 10; 32 is a billion, and 20 GB on the disk. --levels: the town lies in levels, and
 pictures leave out what is finer than so many pixels, as the viewport's first ones do."""
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 
 #include "clouds.h"
 #include "levels.h"
+#include "base/platform.h"
 #include "scene/cloud.h"
 #include "support.h"
 
@@ -121,7 +122,6 @@ struct town {
     const patina_cloud *quarter;
     struct patina_cloud whole; // its numbers, and chunks
     struct pt_cloud_writer *writer;
-    uint32_t *order;
     uint8_t *colors;
     uint32_t chunks; // so many are done, and slots
     uint64_t slots;
@@ -148,17 +148,14 @@ static void add_chunks(struct town *town, const struct level *level, const uint3
     }
 }
 
-static void add_points(struct town *town, const struct level *level, const uint32_t place[2], uint32_t number)
+static void add_points(struct town *town, const struct level *level, const uint32_t place[2])
 {
     const struct patina_cloud *from = town->quarter;
     const uint64_t first = level->slot, slots = level->slot_end - first;
-    for (uint64_t i = 0; i < slots; i++)
-        town->order[i] = from->order[first + i] + number * (uint32_t)from->info.count;
     for (uint64_t i = 3 * first; i < 3 * level->slot_end; i++) // of 256ths, another tone a quarter
         town->colors[i - 3 * first] =
             (uint8_t)(((const uint8_t *)from->colors)[i] * (200 + (place[0] * 7 + place[1] * (5 + i % 3)) % 56) >> 8);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, (const float *)from->positions + 3 * first, slots * 12);
-    pt_cloud_writer_add(town->writer, PT_ARRAY_ORDER, town->order, slots * 4);
+    pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, (const uint32_t *)from->positions + 2 * first, slots * 8);
     pt_cloud_writer_add(town->writer, PT_ARRAY_SURFELS, from->surfels + first, slots * 4);
     pt_cloud_writer_add(town->writer, PT_ARRAY_COLORS, town->colors, slots * 3);
     pt_cloud_writer_add(town->writer, PT_ARRAY_SHAPES, from->shapes + first, slots * 4);
@@ -173,13 +170,40 @@ static void add_level(struct town *town, const struct level *level, uint32_t acr
         if (place[0] >= across || place[1] >= across)
             continue;
         add_chunks(town, level, place);
-        add_points(town, level, place, done++);
+        add_points(town, level, place);
+        done++;
     }
+}
+
+// Its positions, as its file has them.
+static void pack(struct patina_cloud *quarter)
+{
+    uint32_t *words = pt_pages_alloc(quarter->slots * 8);
+    if (!words)
+        support_die("a town: out of memory");
+    for (int k = 0; k < 3; k++) {
+        quarter->info.box_min[k] = INFINITY;
+        quarter->info.box_max[k] = -INFINITY;
+    }
+    for (uint32_t c = 0; c < quarter->chunk_count; c++) {
+        struct pt_chunk *chunk = &quarter->chunks[c];
+        const float *positions = (const float *)quarter->positions + 3 * (uint64_t)chunk->first;
+        const double moved = pt_chunk_pack(chunk, positions, words + 2 * (uint64_t)chunk->first);
+        quarter->info.packed_error = fmax(quarter->info.packed_error, moved);
+        for (int k = 0; k < 3; k++) {
+            quarter->info.box_min[k] = fmin(quarter->info.box_min[k], chunk->origin[k] + (double)chunk->box_min[k]);
+            quarter->info.box_max[k] = fmax(quarter->info.box_max[k], chunk->origin[k] + (double)chunk->box_max[k]);
+        }
+    }
+    pt_pages_free(quarter->positions, quarter->slots * 12);
+    quarter->positions = words;
+    quarter->packed = 1;
 }
 
 static void set_numbers(struct patina_cloud *whole, const patina_cloud *quarter, uint32_t quarters)
 {
     *whole = *quarter;
+    whole->unordered = 1;
     whole->slots *= quarters;
     whole->chunk_count *= quarters;
     whole->info.count *= quarters;
@@ -197,9 +221,10 @@ uint64_t town_write(const char *path, uint32_t across, uint32_t points, uint32_t
     struct level level[LEVELS_MOST] = {{0, quarter->chunk_count, 0, quarter->slots}};
     if (levels > 1)
         levels_make(quarter, levels, level);
-    struct town town = {.quarter = quarter, .order = malloc(quarter->slots * 4), .colors = malloc(quarter->slots * 3)};
+    pack(quarter);
+    struct town town = {.quarter = quarter, .colors = malloc(quarter->slots * 3)};
     set_numbers(&town.whole, quarter, across * across);
-    if (!town.order || !town.colors || !town.whole.chunks)
+    if (!town.colors || !town.whole.chunks)
         support_die("a town: out of memory");
     CHECK(pt_cloud_writer_begin(path, &town.whole, &town.writer), NULL);
     for (uint32_t k = 0; k < (levels > 1 ? levels : 1); k++)
@@ -210,8 +235,7 @@ uint64_t town_write(const char *path, uint32_t across, uint32_t points, uint32_t
     CHECK(pt_cloud_writer_end(town.writer, &town.whole), NULL);
     const uint64_t slots = town.whole.slots;
     free(town.whole.chunks);
-    free(town.order);
     free(town.colors);
     patina_cloud_destroy(quarter);
-    return slots * 27;
+    return slots * 19;
 }
