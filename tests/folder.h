@@ -3,6 +3,8 @@
 #ifndef PT_TEST_FOLDER_H
 #define PT_TEST_FOLDER_H
 
+#include "base/platform.h"
+
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -54,13 +56,24 @@ static inline uint32_t files_in(const char *folder)
 }
 #endif
 
-// A folder of this test alone; the name ends in XXXXXX, which becomes something else.
-static inline int make_folder_of(char *name)
+// A folder of this run alone; the name ends in XXXXXX, which becomes something else.
+static inline int make_folder_of(char *name) { return !mkdtemp(name); }
+
+// Whether the system takes at once what is given back of a mapped file. Windows does where pages are unlocked that nobody locked; wine
+// only unlocks.
+static inline int returned_goes_at_once(void)
 {
-#ifdef _WIN32
-    return mkdir(name); // where the test runs
+#if defined __APPLE__
+    return 0;
+#elif defined _WIN32
+    void *library = pt_library_open("ntdll.dll");
+    const int wine = library && pt_library_find(library, "wine_get_version");
+    pt_library_close(library);
+    if (wine)
+        printf("  not asked of wine: whether what is given back of a file goes at once\n");
+    return !wine;
 #else
-    return !mkdtemp(name);
+    return 1;
 #endif
 }
 

@@ -9,6 +9,8 @@
 
 #include <cmocka.h>
 
+#include "folder.h" // behind cmocka.h
+
 #include <errno.h>
 #include <locale.h>
 #include <stdlib.h>
@@ -246,23 +248,6 @@ static void test_map_among_pages(void **state)
     }
 }
 
-// Whether the system takes what is given back at once. Windows does where pages are unlocked that nobody locked; wine only unlocks.
-static int goes_at_once(void)
-{
-#if defined __APPLE__
-    return 0;
-#elif defined _WIN32
-    void *library = pt_library_open("ntdll.dll");
-    const int wine = library && pt_library_find(library, "wine_get_version");
-    pt_library_close(library);
-    if (wine)
-        printf("  not asked of wine: whether what is given back of a file goes at once\n");
-    return !wine;
-#else
-    return 1;
-#endif
-}
-
 // What is given back of a mapped file is held no longer, and is there again when it is read; so is what was expected. Its neighbours in
 // the same file stay.
 static void test_returned(void **state)
@@ -295,7 +280,7 @@ static void test_returned(void **state)
            1e-6 * (double)after, 1e-6 * (double)pt_free_memory());
     if (before) { // where the system tells
         assert_true(held >= before + SIZE - 2 * PART);
-        if (goes_at_once())
+        if (returned_goes_at_once())
             assert_true(after <= held - (SIZE - 4 * PART));
     }
     assert_true(pt_free_memory() == 0 || pt_free_memory() > SIZE);

@@ -264,7 +264,7 @@ static void test_analyses_files(void **state)
     (void)state;
     enum { LITTLE = 16 << 20, JUST_TOO_MANY = 310000, FEW = 4 };
 #ifdef _WIN32
-    char folder[] = "patina-task-files";
+    char folder[] = "patina-task-XXXXXX";
 #else
     char folder[] = "/tmp/patina-task-XXXXXX";
 #endif
