@@ -183,11 +183,12 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
 int pt_frame_dump(const struct patina_frame *frame, const char *folder)
 {
     const int sampled = frame->sampling[0] * frame->sampling[1] > 1; // what lies between is of the last finer picture
+    // bins of discs are a device's own: addresses, and blocks as its threads came to them
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int level = 0; level < PT_SLOTS; level++) {
             const struct pt_buffer *plane = &frame->planes.at[p][level];
             char path[4096];
-            if (!plane->size || frame->planes.lost[p][level] ||
+            if (!plane->size || frame->planes.lost[p][level] || pt_plane_rows[p].size == PT_SIZE_DISCS ||
                 (sampled && p != PT_PLANE_KEYS && pt_plane_rows[p].size != PT_SIZE_CROP))
                 continue;
             void *copy = malloc(plane->size);

@@ -728,6 +728,15 @@ def test_planes():
     assert any(name.endswith(".txt") for name in files) and len(files) >= 4, files
     assert {"KEYS_0.raw", "FROM_0.raw", "NORMAL_0.raw", "DEFF_0.raw", "COMBINED_0.raw"} <= set(files), files
     run("render", "planes.ply", "--dump-planes", "no/such/folder", code=1)
+    found = []
+    for number, (device, threads) in enumerate((("cpu", 1), ("cpu", 3), ("cpu-scalar", 2))):  # of discs: nothing of how threads came by
+        folder = FOLDER / f"discs-{number}"
+        folder.mkdir()
+        run("render", "planes.ply", "--surface", "splats", "--opacity", "0.5", "--dump-planes", folder.name, "--size", "40x30", "--device", device,
+            "--threads", threads)
+        found.append({path.name: path.read_bytes() for path in folder.iterdir()})
+    differ = [name for name in found[0].keys() | found[1].keys() | found[2].keys() if len({one.get(name) for one in found}) > 1]
+    assert "KEYS_0.raw" in found[0] and not differ, differ
 
 
 def test_interrupt():

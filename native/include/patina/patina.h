@@ -756,7 +756,7 @@ PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffe
 PATINA_API size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, char *buffer, size_t size);
 // 1: from the next render on no planes share memory, so that patina_frame_dump_planes has them all; takes more of it. 0: as at first.
 PATINA_API int patina_frame_keep_planes(patina_frame *frame, uint32_t keep);
-// Writes every plane of the last render, those that others took the place of left out, as raw little-endian files with a .txt line of their shape into a folder.
+// Writes every plane of the last render, but bins of discs and those that others took the place of, as raw little-endian files with a .txt line of their shape into a folder.
 PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *folder);
 
 // ---- panoramas: equirectangular pictures around an eye, as Blender's -------------------------------------------------------
