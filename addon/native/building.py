@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from . import Cloud, Progress, Task, _describe, _Handle, _handle_of, abi
+from . import Cloud, PatinaError, Progress, Task, _describe, _Handle, _handle_of, abi
 
 Corner = tuple[float, float, float]
 
@@ -30,6 +30,7 @@ class Builder(_Handle):
                                      threads=threads, narrow_colors=(2 if zeros else 1) if narrow else 0)
         super().__init__(os.fsencode(path), byref(self._desc), create="patina_builder_begin")
         self._adding: list[Task] = []  # one at the most
+        self._failed: PatinaError | None = None  # what kept a piece out: without it the file is none
         weakref.finalize(self, _settle, self._adding)  # before the builder goes
 
     def close(self) -> None:
@@ -41,14 +42,21 @@ class Builder(_Handle):
             classes: np.ndarray | None = None, origin: Corner = (0.0,) * 3) -> None:
         """The next points, as Cloud takes them, which stay as they are; what the first piece has, all have. Narrow: colors of 16 bits that 8 hold
         become bytes, and normals, colors, scalars and classes that are zero everywhere are none, unless zeros stay. Raises what kept the piece
-        before from being taken, too."""
+        before from being taken, and whatever comes after it, too."""
         arrays = positions, normals, colors, opacities, radii, scalars, classes
         self._wait()
         self._adding.append(Task("add_to_build", self._handle, byref(_describe(*arrays, origin=origin)), keep=arrays))
 
     def _wait(self) -> None:
-        while self._adding:
-            self._adding.pop().result()
+        if not self._finalizer.alive:
+            raise PatinaError("this builder is closed")
+        try:
+            while self._adding:
+                self._adding.pop().result()
+        except PatinaError as error:
+            self._failed = error
+        if self._failed:
+            raise self._failed
 
     def start_end(self, progress: Progress | None = None) -> Task:
         """A task that writes the file: once, and then nothing may be added."""

@@ -141,6 +141,8 @@ struct pt_whole {
 int pt_whole_begin(const char *path, struct pt_whole *whole); // an error: there is nothing to end
 // good: all was written, so the file takes its place. By the thread that wrote. Returns the error that kept it from doing so.
 int pt_whole_end(struct pt_whole *whole, int good);
+// Puts a file in another's place, which is one or the other at any time. Returns an error as above.
+int pt_file_replace(const char *path, const char *by);
 
 // ---- libraries ---------------------------------------------------------------------------------------------------------
 

@@ -433,13 +433,15 @@ int pt_whole_begin(const char *path, struct pt_whole *whole)
     return error == EWOULDBLOCK ? EBUSY : error;
 }
 
+int pt_file_replace(const char *path, const char *by) { return rename(by, path) ? errno : 0; }
+
 int pt_whole_end(struct pt_whole *whole, int good)
 {
     int error = good ? 0 : errno ? errno : EIO;
     if (fclose(whole->stream) && !error)
         error = errno;
-    if (!error && rename(whole->beside, whole->path))
-        error = errno;
+    if (!error)
+        error = pt_file_replace(whole->path, whole->beside);
     if (error)
         pt_file_remove(whole->beside);
     close((int)whole->lock); // nobody else took the name before

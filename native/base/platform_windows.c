@@ -516,7 +516,7 @@ int pt_whole_begin(const char *path, struct pt_whole *whole)
 }
 
 // What another program has open, or maps, cannot be replaced. What looks for viruses holds new files for a moment: asked again.
-static int replace(const char *path, const char *by)
+int pt_file_replace(const char *path, const char *by)
 {
     enum { TRIES = 6, PAUSE = 15 }; // milliseconds
     int error = 0;
@@ -544,7 +544,7 @@ int pt_whole_end(struct pt_whole *whole, int good)
     if (fclose(whole->stream) && !error)
         error = errno;
     if (!error)
-        error = replace(whole->path, whole->beside);
+        error = pt_file_replace(whole->path, whole->beside);
     if (error)
         pt_file_remove(whole->beside);
     free(whole->path);

@@ -352,6 +352,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     const struct pt_instance *instance = &scene->instances[i];
     const struct pt_eye *eye = range ? &range->eye : &survey->camera;
     const double thinned = survey->thinned[i];
+    const int narrow = thinned <= pt_thinning(scene); // no disc is drawn wider than bounds know
     const double faces = range ? (double)pt_range_reach(survey->cells[i].pixels[0]) : 0.0;
     const struct pt_to_place what = {scene, instance, &survey->objects[i]};
     out->instance = instance;
@@ -377,7 +378,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         const double *bounds = seen->extent.rect,
                      around[4] = {bounds[0] - faces, bounds[1] - faces, bounds[2] + faces, bounds[3] + faces};
         uint32_t *rect = out->bounds[out->chunk_count].rect, cells[4];
-        if (seen->wide != (kind != PT_AS_POINTS) || (seen->extent.beside && !range) ||
+        if (seen->wide != (kind != PT_AS_POINTS) || (seen->extent.beside && !range && narrow) ||
             !pt_plan_is_sound(scene, instance->cloud, seen->chunk) ||
             !pt_rect_in_window(&plan->view, around, plan->guard, rect))
             continue;

@@ -99,13 +99,20 @@ struct pt_cloud_writer {
     struct pt_page_summing pages;
     uint64_t pages_at;
     int good;
+    int error; // of the system, as the thread saw it that found that it is not
 };
+
+static void set_bad(struct pt_cloud_writer *writer, int error)
+{
+    writer->error = writer->good ? error : writer->error;
+    writer->good = 0;
+}
 
 static void write_piece(struct pt_cloud_writer *writer, int section, const void *data, size_t size)
 {
     writer->header.sums[section] = add_piece(writer->header.sums[section], data, size);
-    writer->good &= !pt_stream_seek(writer->whole.stream, writer->at[section]) &&
-                    fwrite(data, size, 1, writer->whole.stream) == 1;
+    if (pt_stream_seek(writer->whole.stream, writer->at[section]) || fwrite(data, size, 1, writer->whole.stream) != 1)
+        set_bad(writer, errno);
     writer->at[section] += size;
 }
 
@@ -142,7 +149,8 @@ void pt_cloud_writer_add(struct pt_cloud_writer *writer, enum pt_array section, 
 {
     const char *from = data;
     size_t *held = &writer->held[section];
-    writer->good &= size <= writer->left[section];
+    if (size > writer->left[section])
+        set_bad(writer, 0);
     if (writer->good)
         pt_page_summing_add(&writer->pages, writer->cloud, section, data, size);
     for (uint64_t done = 0; done < size && writer->good;) {
@@ -159,8 +167,7 @@ void pt_cloud_writer_add(struct pt_cloud_writer *writer, enum pt_array section, 
                 *held = 0;
             }
         } else {
-            errno = ENOMEM;
-            writer->good = 0;
+            set_bad(writer, ENOMEM);
         }
         done += some;
     }
@@ -215,6 +222,8 @@ int pt_cloud_writer_end(struct pt_cloud_writer *writer, const struct patina_clou
     good = good && !pt_stream_seek(writer->whole.stream, 0) &&
            fwrite(&writer->header, sizeof writer->header, 1, writer->whole.stream) == 1 &&
            !pt_stream_resize(writer->whole.stream, writer->header.size);
+    if (!writer->good)
+        errno = writer->error;
     const int error = pt_whole_end(&writer->whole, good);
     const int code = error ? fail_with(writer->path, "written", error) : PATINA_OK;
     pt_page_summing_end(&writer->pages);
@@ -293,6 +302,10 @@ static int save(const patina_cloud *cloud, const char *path, struct patina_cloud
     free(words);
     if (error)
         return error;
+    if (!isfinite(out->info.packed_error)) {
+        pt_cloud_writer_drop(writer);
+        return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT, "%s: points lie too far apart to be packed", path);
+    }
     pt_cloud_writer_add(writer, PT_ARRAY_CHUNKS, out->chunks, sections[PT_ARRAY_CHUNKS].size);
     return pt_cloud_writer_end(writer, out);
 }
@@ -310,7 +323,7 @@ static int save_packed(const patina_cloud *cloud, const char *path, struct patin
     const int error = save(cloud, path, out);
     free(chunks);
     if (!error)
-        pt_log(PT_LOG_INFO, "%s: packed positions lie at most %.3g from where they were given", path, out->info.packed_error);
+        pt_log(PT_LOG_INFO, "%s: packing moved positions by %.3g at most", path, out->info.packed_error);
     return error;
 }
 

@@ -62,7 +62,8 @@ struct job {
     patina_builder *builder;
     struct tool_stations stations;
     int has_stations;
-    const char *place; // the built cloud: beside the file, where an analysis follows
+    const char *place; // the built cloud: beside the file, where something follows
+    const char *found; // the analysed one: the file, or beside it, where it is made smaller
     uint64_t memory;
 };
 
@@ -184,7 +185,7 @@ static int analyse(struct job *job)
     desc.free_space = desc.station_count > 1; // one alone sees through nothing
     report_begin(&job->report, "analysing the cloud");
     const int told = !pt_thread_start(&thread, tell, &teller, 0); // whoever has no thread for it hears nothing
-    const int code = patina_cloud_analyse_file(job->place, &desc, job->memory, job->build->out, job->progress);
+    const int code = patina_cloud_analyse_file(job->place, &desc, job->memory, job->found, job->progress);
     atomic_store(&teller.done, 1);
     if (told)
         pt_thread_join(&thread);
@@ -193,31 +194,60 @@ static int analyse(struct job *job)
 
 static int is_smaller(const struct tool_build *build) { return build->pack || build->drop_order; }
 
-// A saved cloud becomes the one that is asked for, smaller where that is, in its own place too.
-static int save_as(const struct job *job, const char *from)
+static char *beside(const char *path, const char *ending)
+{
+    char *name = malloc(strlen(path) + strlen(ending) + 1);
+    if (name)
+        strcat(strcpy(name, path), ending);
+    else
+        tool_say("out of memory");
+    return name;
+}
+
+static int save_into(const struct job *job, const char *from, const char *to)
 {
     const patina_save_desc desc = {
         .struct_size = sizeof desc, .pack = (uint32_t)job->build->pack, .drop_order = (uint32_t)job->build->drop_order};
-    patina_cloud_info info = {.struct_size = sizeof info};
     patina_cloud *cloud = NULL;
-    int code = patina_cloud_open(from, &cloud), result = TOOL_OK;
+    int code = patina_cloud_open(from, &cloud);
     if (!code)
-        code = patina_cloud_save_as(cloud, job->build->out, &desc);
-    if (code)
-        result = fail(job, from, cloud, code);
-    patina_cloud_destroy(cloud);
-    if (code || !desc.pack)
-        return result;
-    cloud = NULL;
-    code = patina_cloud_open(job->build->out, &cloud);
-    if (!code)
-        code = patina_cloud_get_info(cloud, &info);
-    if (code)
-        result = fail(job, job->build->out, cloud, code);
-    else
-        tool_say("note: positions are packed, and lie at most %.3g from where %s has them", info.packed_error, job->build->in);
+        code = patina_cloud_save_as(cloud, to, &desc);
+    const int result = code ? fail(job, from, cloud, code) : TOOL_OK;
     patina_cloud_destroy(cloud);
     return result;
+}
+
+static int tell_packed(const struct job *job)
+{
+    patina_cloud_info info = {.struct_size = sizeof info};
+    patina_cloud *cloud = NULL;
+    int code = patina_cloud_open(job->build->out, &cloud);
+    if (!code)
+        code = patina_cloud_get_info(cloud, &info);
+    const int result = code ? fail(job, job->build->out, cloud, code) : TOOL_OK;
+    if (!code)
+        tool_say("note: packing moved positions by %.3g at most", info.packed_error);
+    patina_cloud_destroy(cloud);
+    return result;
+}
+
+// A saved cloud becomes the one that is asked for, smaller where that is. In its own place too: what is mapped is replaced on no Windows, so it
+// is closed before.
+static int save_as(const struct job *job, const char *from)
+{
+    const char *out = job->build->out;
+    char *own = strcmp(from, out) ? NULL : beside(out, ".smaller"), text[128];
+    if (!own && !strcmp(from, out))
+        return TOOL_FAILED;
+    int result = save_into(job, from, own ? own : out);
+    const int error = own && !result ? pt_file_replace(out, own) : 0;
+    if (error) {
+        tool_say("%s: cannot be written: %s", out, pt_error_text(error, text, sizeof text));
+        pt_file_remove(own);
+        result = TOOL_FAILED;
+    }
+    free(own);
+    return result || !job->build->pack ? result : tell_packed(job);
 }
 
 static int finish_cloud(struct job *job)
@@ -237,16 +267,11 @@ static int finish_cloud(struct job *job)
     if (!result && analysed)
         return save_as(job, job->place);
     result = result ? result : analyse(job);
-    return result || !is_smaller(job->build) ? result : save_as(job, job->build->out);
-}
-
-static char *beside(const char *path)
-{
-    static const char ending[] = ".built";
-    char *name = malloc(strlen(path) + sizeof ending);
-    if (name)
-        memcpy(memcpy(name, path, strlen(path)) + strlen(path), ending, sizeof ending);
-    return name;
+    if (job->found == job->build->out)
+        return result;
+    result = result ? result : save_as(job, job->found);
+    pt_file_remove(job->found);
+    return result;
 }
 
 // A saved cloud needs no building; what is not analysed gets its name at once.
@@ -256,20 +281,19 @@ static int convert(struct job *job)
     const int built = tool_begins(build->in, "patina\n\x1a", 8);
     if (built && build->attribute)
         return tool_misuse("--attribute: a saved cloud has the one that it was made with");
-    char *own = built || build->unanalysed ? NULL : beside(build->out);
+    const int follows = !build->unanalysed || is_smaller(build);
+    char *own = !built && follows ? beside(build->out, ".built") : NULL;
+    char *found = !build->unanalysed && is_smaller(build) ? beside(build->out, ".analysed") : NULL;
+    int result = (own || built || !follows) && (found || build->unanalysed || !is_smaller(build)) ? TOOL_OK : TOOL_FAILED;
     job->place = built ? build->in : own ? own : build->out;
-    if (!own && !built && !build->unanalysed) {
-        tool_say("out of memory");
-        return TOOL_FAILED;
-    }
-    int result = built ? TOOL_OK : build_cloud(job);
-    if (!result && (built || own)) {
+    job->found = found ? found : build->out;
+    if (!result && !built)
+        result = build_cloud(job);
+    if (!result && (built || own))
         result = finish_cloud(job);
-        if (own)
-            pt_file_remove(own);
-    } else if (!result && is_smaller(build)) {
-        result = save_as(job, build->out);
-    }
+    if (own)
+        pt_file_remove(own);
+    free(found);
     free(own);
     return result;
 }

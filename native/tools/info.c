@@ -89,7 +89,7 @@ static int info_of_saved(const char *path)
     printf("format      saved cloud\n");
     printf("points      %llu%s\n", (unsigned long long)info.count, info.numbered ? ", numbered as they lie" : "");
     if (info.packed)
-        printf("positions   packed, at most %.3g from where they were given\n", info.packed_error);
+        printf("positions   packed, which moved them by %.3g at most\n", info.packed_error);
     else
         printf("positions   float32 a chunk\n");
     if (info.box_min[0] <= info.box_max[0]) {

@@ -9,6 +9,7 @@
 
 #include "folder.h" // behind cmocka.h
 
+#include <errno.h>
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -393,6 +394,47 @@ static void test_full_disk(void **state)
     scan_free(&scan);
 }
 
+struct addition {
+    struct pt_cloud_writer *writer;
+    const patina_cloud *cloud;
+};
+
+static void add_positions(void *context)
+{
+    const struct addition *addition = context;
+    pt_cloud_writer_add(addition->writer, PT_ARRAY_POSITIONS, addition->cloud->positions, addition->cloud->slots * 12);
+}
+
+// Which thread found the disk full is not who ends the file: what kept it from being written is told all the same.
+static void test_full_for_another(void **state)
+{
+    (void)state;
+    struct scan scan = plane(MANY);
+    struct pt_thread thread;
+    struct rlimit before, less;
+    struct addition addition = {NULL, NULL};
+    patina_cloud *cloud = NULL;
+    save_plain(&scan, PLANE);
+    CHECK(patina_cloud_open(at("plain"), &cloud), NULL);
+    remove(at("found"));
+    CHECK(pt_cloud_writer_begin(at("found"), cloud, &addition.writer), NULL);
+    addition.cloud = cloud;
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    less = before;
+    less.rlim_cur = 100000;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &less), 0);
+    assert_int_equal(pt_thread_start(&thread, add_positions, &addition, 0), 0);
+    pt_thread_join(&thread);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    errno = 0;
+    assert_int_equal(pt_cloud_writer_end(addition.writer, cloud), PATINA_ERROR_FILE);
+    assert_non_null(strstr(support_message(NULL), strerror(EFBIG)));
+    assert_false(is_there(at("found")));
+    patina_cloud_destroy(cloud);
+    scan_free(&scan);
+}
+
 static void test_killed(void **state)
 {
     (void)state;
@@ -449,12 +491,14 @@ static int remove_folder(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_same),        cmocka_unit_test(test_files),  cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_same),        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_refused),
 #ifdef __linux__
         cmocka_unit_test(test_read_before),
 #endif
 #ifndef _WIN32
-        cmocka_unit_test(test_full_disk),   cmocka_unit_test(test_killed),
+        cmocka_unit_test(test_full_disk),   cmocka_unit_test(test_full_for_another),
+        cmocka_unit_test(test_killed),
 #endif
     };
 #ifdef _WIN32

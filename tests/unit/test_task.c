@@ -340,6 +340,57 @@ static void test_analyses_files(void **state)
     assert_int_equal(rmdir(folder), 0); // nothing else was left
 }
 
+// Pieces are added while the caller reads on: the file is that of a builder that was waited for. A piece that is refused says so at its task, and
+// a builder may go when its last task has.
+static void test_adds_to_builds(void **state)
+{
+    (void)state;
+    enum { PIECE = 90000 };
+    char path[2][64] = {"/tmp/patina-task-XXXXXX", "/tmp/patina-task-XXXXXX"};
+    const patina_builder_desc how = {.struct_size = sizeof how, .memory = 64 << 20};
+    const patina_cloud_desc all = describe(POINTS);
+    patina_builder *builder = NULL;
+    patina_task *task = NULL;
+    for (int beside = 0; beside < 2; beside++) {
+        const int descriptor = mkstemp(path[beside]);
+        assert_true(descriptor >= 0);
+        close(descriptor); // Windows replaces no file that is open
+        assert_int_equal(patina_builder_begin(path[beside], &how, &builder), PATINA_OK);
+        for (uint64_t first = 0; first < POINTS; first += PIECE) {
+            patina_cloud_desc piece = all;
+            piece.count = POINTS - first < PIECE ? POINTS - first : PIECE;
+            piece.position.data = points[first];
+            piece.color.data = colors[first];
+            if (!beside) {
+                assert_int_equal(patina_builder_add(builder, &piece), PATINA_OK);
+                continue;
+            }
+            assert_int_equal(patina_task_add_to_build(builder, &piece, &task), PATINA_OK);
+            memset(&piece, 0, sizeof piece); // descriptors are copied
+            assert_int_equal(patina_task_wait(task), PATINA_OK);
+            patina_task_destroy(task);
+        }
+        assert_int_equal(patina_builder_end(builder, NULL), PATINA_OK);
+        patina_builder_destroy(builder);
+    }
+    assert_same_file(path[0], path[1]);
+    assert_int_equal(patina_builder_begin(path[1], &how, &builder), PATINA_OK);
+    assert_int_equal(patina_builder_add(builder, &all), PATINA_OK);
+    patina_cloud_desc elsewhere = all;
+    elsewhere.origin[0] = 1.0;
+    assert_int_equal(patina_task_add_to_build(builder, &elsewhere, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_ARGUMENT);
+    assert_non_null(strstr(message(task), "origin"));
+    patina_task_destroy(task);
+    assert_int_equal(patina_task_add_to_build(builder, &all, &task), PATINA_OK);
+    patina_task_destroy(task); // waits
+    patina_builder_destroy(builder);
+    assert_int_equal(patina_task_add_to_build(NULL, &all, &task), PATINA_ERROR_ARGUMENT);
+    assert_same_file(path[0], path[1]); // it was not ended
+    unlink(path[0]);
+    unlink(path[1]);
+}
+
 // Whatever is written over what a section of a saved cloud holds is found, and nothing is where nothing was.
 static void test_damaged_clouds(void **state)
 {
@@ -410,6 +461,7 @@ int main(void)
         cmocka_unit_test(test_colors),
         cmocka_unit_test(test_files),
         cmocka_unit_test(test_analyses_files),
+        cmocka_unit_test(test_adds_to_builds),
         cmocka_unit_test(test_damaged_clouds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -209,7 +209,7 @@ typedef struct patina_cloud_info {
     uint64_t seen_through;      // drawn points that some station saw through: patina_analysis_desc.free_space
     uint32_t packed;            // 1: of a file that was saved so: patina_save_desc.pack
     uint32_t numbered;          // 1: points are numbered as the file has them: patina_save_desc.drop_order
-    double packed_error;        // how far a packed position lies at most from where it was given, object units
+    double packed_error;        // how far packing moved a position at most, object units
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point

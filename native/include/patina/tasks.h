@@ -47,7 +47,8 @@ PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_pro
                                         patina_task **out);                                           // patina_grid_normals
 PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
 PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
-// patina_builder_add, while the host reads the next piece; nothing else is asked of the builder until the task is done.
+// patina_builder_add, while the host reads the next piece: what the arrays of desc point to must stay as it is, and nothing else is asked
+// of the builder, until the task is done.
 PATINA_API int patina_task_add_to_build(patina_builder *builder, const patina_cloud_desc *desc, patina_task **out);
 PATINA_API int patina_task_end_build(patina_builder *builder, patina_progress *progress,
                                      patina_task **out); // patina_builder_end
