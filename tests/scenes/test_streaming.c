@@ -321,7 +321,9 @@ static void test_packed(void **state)
     (void)state;
     for (uint32_t k = 0; k < support_device_count(); k++) {
         const char *name = support_device_name(k);
-        const uint32_t each = support_is_gl(name) ? 3 : strncmp(name, "cpu-", 4) ? 1 : 5; // all of them once; what takes long, some
+        const uint32_t each = support_is_gl(name)        ? 3
+                              : strncmp(name, "cpu-", 4) ? 1
+                                                         : 5; // all of them once; what takes long, some
         patina_device *device = support_device_open(name, 0, 0);
         patina_device *devices[2] = {device, device ? open_device(name, support_is_gl(name) ? CAP_OF_COPIES : 50000, 0) : NULL};
         for (uint32_t i = 0; i < sizeof looks / sizeof *looks && device; i += each) {
