@@ -105,10 +105,6 @@ class Neighbourhoods(Descriptor):
                 ("distances", c_void_p), ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
 
 
-class SaveDesc(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("pack", c_uint32), ("drop_order", c_uint32)]
-
-
 class CloudStyle(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
                 ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
@@ -199,6 +195,10 @@ class Panorama(Descriptor):
 class BuilderDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("memory", c_uint64), ("count", c_uint64), ("box_min", c_double * 3),
                 ("box_max", c_double * 3), ("threads", c_uint32), ("narrow_colors", c_uint32)]
+
+
+class SaveDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("pack", c_uint32), ("drop_order", c_uint32)]
 
 
 class FileInfo(Descriptor):
@@ -322,7 +322,6 @@ CALLS = {
     "patina_cloud_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p),
     "patina_cloud_neighbourhoods": (c_void_p, POINTER(Neighbourhoods), c_void_p),
     "patina_cloud_save": (c_void_p, c_char_p),
-    "patina_cloud_save_as": (c_void_p, c_char_p, POINTER(SaveDesc)),
     "patina_cloud_open": (c_char_p, POINTER(c_void_p)),
     "patina_cloud_verify": (c_char_p, c_void_p),
     "patina_cloud_get_info": (c_void_p, POINTER(CloudInfo)),
@@ -365,6 +364,7 @@ CALLS = {
     "patina_builder_end": (c_void_p, c_void_p),
     "patina_builder_destroy": (c_void_p,),
     "patina_cloud_analyse_file": (c_char_p, POINTER(AnalysisDesc), c_uint64, c_char_p, c_void_p),
+    "patina_cloud_save_as": (c_void_p, c_char_p, POINTER(SaveDesc)),
     "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
     "patina_file_destroy": (c_void_p,),

@@ -217,16 +217,14 @@ static int save_into(const struct job *job, const char *from, const char *to)
     return result;
 }
 
-static int tell_packed(const struct job *job)
+static int read_info(const struct job *job, const char *path, patina_cloud_info *info)
 {
-    patina_cloud_info info = {.struct_size = sizeof info};
     patina_cloud *cloud = NULL;
-    int code = patina_cloud_open(job->build->out, &cloud);
+    int code = patina_cloud_open(path, &cloud);
+    *info = (patina_cloud_info){.struct_size = sizeof *info};
     if (!code)
-        code = patina_cloud_get_info(cloud, &info);
-    const int result = code ? fail(job, job->build->out, cloud, code) : TOOL_OK;
-    if (!code)
-        tool_say("note: packing moved positions by %.3g at most", info.packed_error);
+        code = patina_cloud_get_info(cloud, info);
+    const int result = code ? fail(job, path, cloud, code) : TOOL_OK;
     patina_cloud_destroy(cloud);
     return result;
 }
@@ -236,8 +234,10 @@ static int tell_packed(const struct job *job)
 static int save_as(const struct job *job, const char *from)
 {
     const char *out = job->build->out;
-    char *own = strcmp(from, out) ? NULL : beside(out, ".smaller"), text[128];
-    if (!own && !strcmp(from, out))
+    const int itself = !strcmp(from, out);
+    char *own = itself ? beside(out, ".smaller") : NULL, text[128];
+    patina_cloud_info info;
+    if (itself && !own)
         return TOOL_FAILED;
     int result = save_into(job, from, own ? own : out);
     const int error = own && !result ? pt_file_replace(out, own) : 0;
@@ -247,29 +247,27 @@ static int save_as(const struct job *job, const char *from)
         result = TOOL_FAILED;
     }
     free(own);
-    return result || !job->build->pack ? result : tell_packed(job);
+    if (result || !job->build->pack)
+        return result;
+    result = read_info(job, out, &info);
+    if (!result)
+        tool_say("note: packing moved positions by %.3g at most", info.packed_error);
+    return result;
 }
 
 static int finish_cloud(struct job *job)
 {
-    patina_cloud_info info = {.struct_size = sizeof info};
-    patina_cloud *cloud = NULL;
-    int code = patina_cloud_open(job->place, &cloud), result = TOOL_OK;
-    if (!code)
-        code = patina_cloud_get_info(cloud, &info);
-    if (!code && info.invalid_positions)
+    patina_cloud_info info;
+    int result = read_info(job, job->place, &info);
+    if (!result && info.invalid_positions)
         tool_say("note: %llu points of %s are nowhere, and are not drawn: a coordinate is no finite number",
                  (unsigned long long)info.invalid_positions, job->build->in);
-    const int analysed = job->build->unanalysed || info.has_shapes; // or not to be
-    if (code)
-        result = fail(job, job->place, cloud, code);
-    patina_cloud_destroy(cloud);
-    if (!result && analysed)
+    if (!result && (job->build->unanalysed || info.has_shapes)) // or not to be
         return save_as(job, job->place);
     result = result ? result : analyse(job);
-    if (job->found == job->build->out)
+    if (result || job->found == job->build->out)
         return result;
-    result = result ? result : save_as(job, job->found);
+    result = save_as(job, job->found);
     pt_file_remove(job->found);
     return result;
 }
@@ -281,18 +279,20 @@ static int convert(struct job *job)
     const int built = tool_begins(build->in, "patina\n\x1a", 8);
     if (built && build->attribute)
         return tool_misuse("--attribute: a saved cloud has the one that it was made with");
-    const int follows = !build->unanalysed || is_smaller(build);
-    char *own = !built && follows ? beside(build->out, ".built") : NULL;
-    char *found = !build->unanalysed && is_smaller(build) ? beside(build->out, ".analysed") : NULL;
-    int result = (own || built || !follows) && (found || build->unanalysed || !is_smaller(build)) ? TOOL_OK : TOOL_FAILED;
+    const int builds_beside = !built && (!build->unanalysed || is_smaller(build));
+    const int finds_beside = !build->unanalysed && is_smaller(build);
+    char *own = builds_beside ? beside(build->out, ".built") : NULL,
+         *found = finds_beside ? beside(build->out, ".analysed") : NULL;
+    int result = (builds_beside && !own) || (finds_beside && !found) ? TOOL_FAILED : TOOL_OK;
     job->place = built ? build->in : own ? own : build->out;
     job->found = found ? found : build->out;
     if (!result && !built)
         result = build_cloud(job);
-    if (!result && (built || own))
+    if (!result && (built || own)) {
         result = finish_cloud(job);
-    if (own)
-        pt_file_remove(own);
+        if (own)
+            pt_file_remove(own);
+    }
     free(found);
     free(own);
     return result;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Saved clouds of more points than memory holds, a part of patina.h, which includes it. Its conventions and thread rules hold here too.
+// Saved clouds of more points than memory holds, and smaller ones: a part of patina.h, which includes it. Its conventions and thread rules hold here too.
 #ifndef PATINA_BUILDER_H
 #define PATINA_BUILDER_H
 
@@ -53,6 +53,19 @@ PATINA_API void patina_builder_destroy(patina_builder *builder); // without an e
 // where the disk lacks room. After an error, a cancel or a kill there is no file but the one that was there before.
 PATINA_API int patina_cloud_analyse_file(const char *from, const patina_analysis_desc *desc, uint64_t memory, const char *to,
                                          patina_progress *progress);
+
+// patina_cloud_save, smaller where that is asked for; desc may be NULL. What is packed or numbered anew stays so when it is saved again.
+typedef struct patina_save_desc {
+    size_t struct_size;
+    // 1 = 8 bytes a position in place of 12: a chunk's lie on a grid of 2^21 places across, whose spacing is a power of two, and move to its
+    // nearest place, along an axis by 2^-21 of half the chunk's box or twice that; info.packed_error says how far at most. Pictures are exactly
+    // those of points that lie there. An order that numbers points as they lie is left out
+    uint32_t pack;
+    // 1 = 4 bytes a point less: numbered anew, as they lie in the file, from 0 to info.drawn - 1; what has no place is none of them. Arrays
+    // that belong to the numbers of before fit no longer
+    uint32_t drop_order;
+} patina_save_desc;
+PATINA_API int patina_cloud_save_as(const patina_cloud *cloud, const char *path, const patina_save_desc *desc);
 
 #ifdef __cplusplus
 }

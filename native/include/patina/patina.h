@@ -300,21 +300,8 @@ PATINA_API int patina_cloud_neighbourhoods(const patina_cloud *cloud, const pati
 // Writes the built cloud to a file, and opens it again by mapping: nothing is read but what is drawn, and the memory stays
 // the file's. A file of another version or machine, or a damaged one, is PATINA_ERROR_FORMAT: build the cloud anew. While a
 // cloud is open its file may be replaced (patina_cloud_save does), not written into. A cloud of a file with damaged pages is not saved
-// (PATINA_ERROR_FORMAT, which names them): they would pass as good.
+// (PATINA_ERROR_FORMAT, which names them): they would pass as good. patina_cloud_save_as makes it smaller.
 PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
-// The same, smaller where that is asked for; desc may be NULL. What is packed or numbered anew stays so when it is saved again.
-typedef struct patina_save_desc {
-    size_t struct_size;
-    uint32_t
-        pack; // 1 = positions take 8 bytes a point in place of 12: a chunk's lie on a grid of 2^21 places across, whose spacing
-              // is a power of two, and move to its nearest place, by 2^-21 of half the chunk's box or twice that along an axis.
-              // info.packed_error says by how much at most. Pictures are exactly those of the points where they lie then. An
-              // order that numbers points as they lie is left out
-    uint32_t
-        drop_order; // 1 = 4 bytes a point less: points are numbered anew, as they lie in the file, from 0 to info.drawn - 1; what
-                    // has no place is none of them. Arrays that belong to the numbers of before fit no longer
-} patina_save_desc;
-PATINA_API int patina_cloud_save_as(const patina_cloud *cloud, const char *path, const patina_save_desc *desc);
 PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
 // Reads a saved cloud whole and compares the sum of each of its sections with that of the writing, which opening leaves out but
 // for the chunks: PATINA_ERROR_FORMAT where any differs. progress: may be NULL; stops it too. Any thread, open clouds or not.
