@@ -92,10 +92,15 @@ struct patina_cloud {
     uint8_t *classes;   // slots, or NULL
     uint64_t class_hash;
     enum pt_color_format color_format;
-    uint32_t threads;        // at most, as the caller said; 0: not said
-    struct pt_sights sights; // what its stations saw; empty where nobody asked for free space
-    double built;            // the median of the chunks' `built`
-    double spacing_base;     // class 0: no spacing; class c: base * 2^((c - 1) / 4)
+    uint32_t threads;           // at most, as the caller said; 0: not said
+    struct pt_sights sights;    // what its stations saw; empty where nobody asked for free space
+    double built;               // the median of the chunks' `built`
+    double spacing_base;        // class 0: no spacing; class c: base * 2^((c - 1) / 4)
+    struct patina_cloud *parts; // of one that is made of them (parts.h), else NULL and 0
+    uint32_t part_count;
+    uint32_t first_chunk; // of a part: what of the whole lies before it
+    uint64_t first_slot;
+    uint64_t first_number; // ..., points
 };
 
 // ---- where points are (positions.c) ----------------------------------------------------------------------------------------
@@ -189,6 +194,7 @@ void pt_cloud_writer_drop(struct pt_cloud_writer *writer); // no file
 // them all: only shadows ask. Any thread.
 uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);
 
+struct pt_alive *pt_alive_create(void); // a handle's own, counted once; NULL without memory
 void pt_alive_release(struct pt_alive *alive);
 
 // Caller's arrays. Checks type (types: bits) and components, and makes the stride explicit; no data is fine.

@@ -5,21 +5,30 @@
 #include "base/platform.h"
 #include "page_sums.h"
 #include "paged.h"
+#include "parts.h"
 
 #include <stdlib.h>
+
+struct pt_alive *pt_alive_create(void)
+{
+    struct pt_alive *alive = calloc(1, sizeof *alive);
+    if (alive) {
+        atomic_init(&alive->references, 1);
+        atomic_init(&alive->alive, 1);
+    }
+    return alive;
+}
 
 struct patina_cloud *pt_cloud_new(void)
 {
     struct patina_cloud *cloud = calloc(1, sizeof *cloud);
-    struct pt_alive *alive = calloc(1, sizeof *alive);
+    struct pt_alive *alive = pt_alive_create();
     if (!cloud || !alive) {
         free(cloud);
         free(alive);
         return NULL;
     }
     pt_handle_init(&cloud->handle);
-    atomic_init(&alive->references, 1);
-    atomic_init(&alive->alive, 1);
     cloud->alive = alive;
     return cloud;
 }
@@ -35,6 +44,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     if (!cloud)
         return;
     struct pt_section sections[PT_ARRAYS];
+    pt_parts_destroy(cloud);
     pt_cloud_sections(cloud, sections);
     for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
         pt_pages_free(*sections[i].data, sections[i].size);

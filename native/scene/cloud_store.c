@@ -600,21 +600,8 @@ int patina_cloud_open(const char *path, patina_cloud **out)
     int error = pt_disk_open(path, &disk);
     if (error)
         return fail_with(path, "read", error);
-    struct patina_cloud *cloud = calloc(1, sizeof *cloud);
-    struct pt_alive *alive = calloc(1, sizeof *alive);
-    int code = PATINA_ERROR_MEMORY;
-    if (cloud && alive) {
-        pt_handle_init(&cloud->handle);
-        atomic_init(&alive->references, 1);
-        atomic_init(&alive->alive, 1);
-        cloud->alive = alive;
-        code = open_disk(path, &disk, cloud);
-    } else {
-        pt_fail(NULL, code, "%s: out of memory", path);
-        free(alive);
-        free(cloud);
-        cloud = NULL;
-    }
+    struct patina_cloud *cloud = pt_cloud_new();
+    const int code = cloud ? open_disk(path, &disk, cloud) : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
     pt_disk_close(&disk);
     if (code)
         patina_cloud_destroy(cloud);

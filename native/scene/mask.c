@@ -6,16 +6,6 @@
 
 #include <stdlib.h>
 
-struct pt_alive *pt_alive_create(void)
-{
-    struct pt_alive *alive = calloc(1, sizeof *alive);
-    if (alive) {
-        atomic_init(&alive->references, 1);
-        atomic_init(&alive->alive, 1);
-    }
-    return alive;
-}
-
 struct pt_alive *pt_alive_share(const struct patina_cloud *cloud)
 {
     atomic_fetch_add(&cloud->alive->references, 1);

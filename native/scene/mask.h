@@ -51,8 +51,6 @@ static inline const struct patina_mask *pt_mask_of(const struct pt_instance *ins
     return mask && mask->hides ? mask : NULL;
 }
 
-// A handle's own pt_alive, counted once; NULL without memory.
-struct pt_alive *pt_alive_create(void);
 // The cloud's, counted once more.
 struct pt_alive *pt_alive_share(const struct patina_cloud *cloud);
 

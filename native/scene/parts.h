@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Clouds of more slots than kernels count (they gather by signed 32-bit indices) are made of parts: runs of its chunks, each a cloud to all
+// that draws, with slots of its own. Arrays and the table of chunks are the whole's; a chunk's `first` counts from its part's first slot, so
+// that of a cloud in parts nobody reads it but by its part. An ordinary cloud is its own only part.
+#ifndef PT_PARTS_H
+#define PT_PARTS_H
+
+#include "cloud.h"
+
+// Slots that a part may have: 2^31 - 1, or fewer where PATINA_PART_SLOTS says so, for tests; one chunk at least.
+uint64_t pt_part_slots(void);
+
+static inline uint32_t pt_part_count(const struct patina_cloud *cloud) { return cloud->part_count ? cloud->part_count : 1; }
+static inline const struct patina_cloud *pt_part(const struct patina_cloud *cloud, uint32_t i)
+{
+    return cloud->part_count ? &cloud->parts[i] : cloud;
+}
+
+// Divides a cloud whose chunks and arrays stand into parts of at most so many slots, and counts their chunks' `first` anew. One that fits
+// stays as it is. 0 or PATINA_ERROR_MEMORY (then it has no parts).
+int pt_parts_make(struct patina_cloud *cloud, uint64_t most);
+void pt_parts_destroy(struct patina_cloud *cloud);
+
+#endif
