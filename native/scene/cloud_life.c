@@ -9,16 +9,6 @@
 
 #include <stdlib.h>
 
-struct pt_alive *pt_alive_create(void)
-{
-    struct pt_alive *alive = calloc(1, sizeof *alive);
-    if (alive) {
-        atomic_init(&alive->references, 1);
-        atomic_init(&alive->alive, 1);
-    }
-    return alive;
-}
-
 struct patina_cloud *pt_cloud_new(void)
 {
     struct patina_cloud *cloud = calloc(1, sizeof *cloud);
@@ -31,12 +21,6 @@ struct patina_cloud *pt_cloud_new(void)
     pt_handle_init(&cloud->handle);
     cloud->alive = alive;
     return cloud;
-}
-
-void pt_alive_release(struct pt_alive *alive)
-{
-    if (atomic_fetch_sub(&alive->references, 1) == 1)
-        free(alive);
 }
 
 void patina_cloud_destroy(patina_cloud *cloud)
