@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from check_passes import dense_scene
 from check_points import pixel
-from harness import add_points, check, check_close, new_scene, patina, render, set_world, sphere, stats, written
+from harness import add_points, check, check_close, check_soon, new_scene, patina, render, set_world, sphere, stats, written
 from mathutils import Matrix, Vector
 from patina import engine, jobs, memory, native, options
 from patina import render as drawing
@@ -230,24 +230,27 @@ def test_cancel_is_soon():
     """A large picture stops within 0.2 s of the wish; other programs on the machine are allowed as much again."""
     scene = dense_scene(3000, 3000)
     scene.render.film_transparent = False
-    asked = []
-
-    def poll(progress):
-        if progress > 0.2 and not asked:
-            asked.append(time.perf_counter())
-        return bool(asked)
-
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     view = patina.engine.sync.final_view(scene.camera, depsgraph)
     description = patina.engine.sync.describe(depsgraph, view, lambda what, progress: False)
-    try:
-        drawing.draw(description, ["COMBINED"], poll)
-    except native.PatinaCancelled:
-        late = time.perf_counter() - asked[0]
-        check(late < 0.4, f"{late:.2f} s")
-    else:
-        check(bool(asked), "the picture was done before it could be cancelled")
+
+    def attempt():
+        asked = []
+
+        def poll(progress):
+            if progress > 0.2 and not asked:
+                asked.append(time.perf_counter())
+            return bool(asked)
+
+        try:
+            drawing.draw(description, ["COMBINED"], poll)
+            check(bool(asked), "the picture was done before it could be cancelled")
+        except native.PatinaCancelled:
+            pass
+        return time.perf_counter() - asked[0]
+
+    check_soon(attempt, 0.4)
 
 
 def test_reading_may_be_cancelled():
