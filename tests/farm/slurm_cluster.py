@@ -78,7 +78,7 @@ class Cluster:
         self.started.append(subprocess.Popen(command, stdout=log, stderr=log, env=self.env, start_new_session=True))
         return self.started[-1]
 
-    def wait(self, done, what: str, seconds: float = 90) -> None:
+    def wait(self, done, what: str, seconds: float = 180) -> None:
         end = time.monotonic() + seconds
         while not done():
             logs = "\n".join(path.read_text(errors="replace")[-1500:] for path in self.folder.glob("*.log"))
