@@ -92,16 +92,16 @@ class Plan:
     groups: list[tuple[str, str]]  # object's and asset's name
 
 
-def plan(description: SceneDescription, keys: np.ndarray | None) -> Plan:
-    """keys: (height, width, 1), what each pixel shows; None: not known, or no measure of what is near (glass, lenses)."""
+def plan(description: SceneDescription, numbers: np.ndarray | None) -> Plan:
+    """numbers: (height, width, 1), what each pixel shows; None: not known, or no measure of what is near (glass, lenses)."""
     items = [*description.clouds, *description.meshes]
     groups = list(dict.fromkeys((item.name, item.asset) for item in items if item.role == SEEN))
     number = {group: index for index, group in enumerate(groups)}
     of_item = np.array([number[item.name, item.asset] if item.role == SEEN else -1 for item in items] + [-1])
-    if keys is None or len(groups) <= 3:
+    if numbers is None or len(groups) <= 3:
         owners, colors = [np.full((1, 1), index) for index in range(len(groups))], np.arange(len(groups))
     else:
-        shown = of_item[shown_items(keys, description)]
+        shown = of_item[shown_items(numbers, description)]
         colors = _colors(shown, len(groups))
         painted = np.append(colors, -1)[shown]
         owners = [_spread(np.where(painted == color, shown, -1), REACH) for color in range(colors.max(initial=-1) + 1)]
@@ -116,11 +116,11 @@ def plan(description: SceneDescription, keys: np.ndarray | None) -> Plan:
     return Plan(scenes, owners, groups)
 
 
-def shown_items(keys: np.ndarray, description: SceneDescription) -> np.ndarray:
+def shown_items(numbers: np.ndarray, description: SceneDescription) -> np.ndarray:
     """(height, width): index of the cloud or, behind all clouds, mesh that each pixel shows; one past the last where none."""
-    ids = (keys[..., 0] & np.uint64(0xFFFFFFFF)).astype(np.int64)
     counts = [*(item.cloud.count for item in description.clouds), *(item.mesh.count for item in description.meshes)]
-    return np.minimum(np.searchsorted(np.cumsum([0, *counts]), ids, side='right') - 1, len(counts))
+    firsts = np.cumsum(np.array([0, *counts], np.uint64), dtype=np.uint64)
+    return np.minimum(np.searchsorted(firsts, numbers[..., 0], side='right') - 1, len(counts))
 
 
 def _colors(shown: np.ndarray, count: int) -> np.ndarray:

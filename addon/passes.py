@@ -88,10 +88,10 @@ def _mist(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
     return (share ** power)[..., None].astype(np.float32)
 
 
-def _object_index(keys: np.ndarray, scene: SceneDescription) -> np.ndarray:
+def _object_index(numbers: np.ndarray, scene: SceneDescription) -> np.ndarray:
     """The pass index of the object that each pixel shows."""
     indices = np.array([*(item.pass_index for item in (*scene.clouds, *scene.meshes)), 0], np.float32)
-    return indices[cryptomatte.shown_items(keys, scene)][..., None]
+    return indices[cryptomatte.shown_items(numbers, scene)][..., None]
 
 
 def _mattes(kind: str, number: int) -> RenderPass:
@@ -126,7 +126,7 @@ PASSES = (
     RenderPass("Normal", 3, "XYZ", 'VECTOR', "NORMAL", lambda layer: layer.use_pass_normal),
     RenderPass("Shadow", 3, "RGB", 'COLOR', "SHADOW", lambda layer: layer.patina.use_pass_shadow,
                lambda plane, camera: np.repeat(plane, 3, 2)),
-    RenderPass("IndexOB" if bpy.app.version < (5, 0, 0) else "Object Index", 1, "X", 'VALUE', "KEYS",
+    RenderPass("IndexOB" if bpy.app.version < (5, 0, 0) else "Object Index", 1, "X", 'VALUE', "NUMBERS",
                lambda layer: layer.use_pass_object_index, _object_index),
     RenderPass("Source", 1, "X", 'VALUE', "SOURCE", lambda layer: layer.patina.use_pass_source),
     RenderPass("Line", 1, "X", 'VALUE', "LINE", lambda layer: layer.patina.use_pass_line),

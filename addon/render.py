@@ -65,8 +65,8 @@ def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[f
     native_planes = {plane for plane in wanted if not plane.startswith(cryptomatte.PLANE)}
     if not kinds:
         return _draw_seen(description, native_planes, poll, tile_size, show)
-    picture = _draw_seen(description, native_planes | {"KEYS"}, lambda share: poll(0.5 * share), tile_size, show)
-    made = cryptomatte.plan(description, picture.planes["KEYS"] if _is_hard(description) else None)
+    picture = _draw_seen(description, native_planes | {"NUMBERS"}, lambda share: poll(0.5 * share), tile_size, show)
+    made = cryptomatte.plan(description, picture.planes["NUMBERS"] if _is_hard(description) else None)
 
     def part(number: int) -> Callable[[float], bool]:
         return lambda share: poll(0.5 + 0.5 * (number + share) / len(made.scenes))
@@ -376,7 +376,7 @@ def _draw_pieces(device: native.Device, parts: list[tuple[Canvas, list[str]]], f
 
 
 def _read(frame: native.Frame, name: str) -> np.ndarray:
-    return frame.read_keys() if name == "KEYS" else frame.read(name)
+    return frame.read_numbers() if name == "NUMBERS" else frame.read(name)
 
 
 def shifted(description: SceneDescription, shift: tuple[float, float]) -> SceneDescription:
@@ -394,7 +394,7 @@ def _bits(planes: Iterable[str]) -> int:
 
 def describe(scene: native.Scene, description: SceneDescription, wanted: Iterable[str]) -> None:
     """Fills a native scene; the description's clouds must be built."""
-    planes = {native.split_plane(plane) for plane in {"COMBINED", *wanted} - {"KEYS"}}
+    planes = {native.split_plane(plane) for plane in {"COMBINED", *wanted} - {"NUMBERS"}}
     settings = asdict(description.settings)
     settings["passes"] = _bits(name for name, layer in planes if not layer)
     settings["layer_passes"] = _bits(name for name, layer in planes if layer)

@@ -614,6 +614,13 @@ class Frame(_Handle):
         self._call("read_keys", keys.ctypes.data, keys.nbytes)
         return keys
 
+    def read_numbers(self) -> np.ndarray:
+        """The number of what each pixel shows, (height, width, 1) uint64, in scenes of any size; 2**64 - 1: nothing."""
+        stats = self.stats()
+        numbers = np.empty((stats["height"], stats["width"], 1), np.uint64)
+        self._call("read_numbers", numbers.ctypes.data, numbers.nbytes)
+        return numbers
+
     def stats(self) -> dict[str, Any]:
         stats = abi.FrameStats()
         self._call("get_stats", byref(stats))
@@ -651,7 +658,7 @@ class Panorama:
         name, _ = split_plane(plane)
         pixels = np.empty((*self._size, faces[0].shape[2]), faces[0].dtype)
         pointers = (c_void_p * 6)(*(face.ctypes.data for face in faces))
-        if name == "KEYS":
+        if name in ("KEYS", "NUMBERS"):
             check(library().patina_panorama_join_keys(byref(self._panorama), pointers, pixels.ctypes.data, pixels.nbytes))
         else:
             check(library().patina_panorama_join(byref(self._panorama), PLANES[name][0], pointers, pixels.ctypes.data,

@@ -410,6 +410,7 @@ CALLS = {
     "patina_field_create": (c_void_p, POINTER(FieldDesc), c_void_p, POINTER(c_void_p)),
     "patina_field_destroy": (c_void_p,),
     "patina_field_get_info": (c_void_p, POINTER(FieldInfo)),
+    "patina_frame_read_numbers": (c_void_p, c_void_p, c_size_t),
     "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
     "patina_frame_highlight": (c_void_p, c_void_p, c_void_p, c_float, c_void_p, c_size_t),
     "patina_task_render": (c_void_p, c_void_p, POINTER(Read), c_uint32, POINTER(c_void_p)),

@@ -309,6 +309,13 @@ int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t siz
     return pt_frame_read_keys(frame, keys, size);
 }
 
+int patina_frame_read_numbers(const patina_frame *frame, uint64_t *numbers, size_t size)
+{
+    if (!frame || !numbers)
+        return fail("patina_frame_read_numbers: frame or numbers is NULL");
+    return pt_frame_read_numbers(frame, numbers, size);
+}
+
 int patina_frame_read_layer(const patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size)
 {
     if (!frame || !pixels)

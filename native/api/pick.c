@@ -325,7 +325,7 @@ static int take_keys(struct pick *pick, const struct patina_frame *frame, uint64
     const size_t size = (size_t)(pick->region[2] - pick->region[0]) * (pick->region[3] - pick->region[1]) * sizeof **keys;
     *keys = malloc(size);
     pick->keys = *keys;
-    return *keys ? pt_frame_read_slots(frame, pick->scene, *keys, size) : PATINA_ERROR_MEMORY;
+    return *keys ? pt_frame_read_ids(frame, pick->scene, *keys, size) : PATINA_ERROR_MEMORY;
 }
 
 static int run(struct pick *pick, const struct patina_frame *frame, struct pt_inverse_clip *room)
@@ -381,19 +381,14 @@ int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, cons
                                              : PATINA_OK;
 }
 
-// The instance that a slot's number is of, and whether its mask selects it.
-static int is_selected(const struct patina_scene *scene, uint32_t id, uint32_t *last)
+// Whether the mask of the instance that an id is of selects it. instance: of the id before.
+static int is_selected(const struct patina_frame *frame, const struct patina_scene *scene, uint32_t id, uint32_t *instance)
 {
-    const struct pt_instance *instance = &scene->instances[*last];
-    if (id - instance->id_base >= instance->cloud->slots) {
-        for (*last = scene->cloud_count - 1; *last && scene->instances[*last].id_base > id;)
-            --*last;
-        instance = &scene->instances[*last];
-    }
-    const uint32_t slot = id - instance->id_base;
-    const struct patina_mask *mask = instance->style.mask;
-    return mask && slot < instance->cloud->slots &&
-           (mask->words[slot / PT_SLOTS_A_WORD] >> (PT_SLOTS_A_WORD + slot % PT_SLOTS_A_WORD) & 1u);
+    uint32_t slot;
+    if (!pt_numbering_find(&frame->key_ids, id, instance, &slot))
+        return 0;
+    const struct patina_mask *mask = scene->instances[*instance].style.mask;
+    return mask && (mask->words[slot / PT_SLOTS_A_WORD] >> (PT_SLOTS_A_WORD + slot % PT_SLOTS_A_WORD) & 1u);
 }
 
 int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene, const float color[3], float strength,
@@ -405,11 +400,10 @@ int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene,
     uint64_t *keys = malloc((count + 1) * sizeof *keys);
     if (!keys)
         return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_highlight: out of memory");
-    int error = pt_frame_read_slots(frame, scene, keys, count * sizeof *keys);
+    int error = pt_frame_read_ids(frame, scene, keys, count * sizeof *keys);
     uint32_t last = 0;
     for (size_t i = 0; i < count && !error && scene->cloud_count; i++) {
-        if (keys[i] >> 32 == PT_KEY_EMPTY_Z || (uint32_t)keys[i] >= scene->points ||
-            !is_selected(scene, (uint32_t)keys[i], &last))
+        if (keys[i] >> 32 == PT_KEY_EMPTY_Z || !is_selected(frame, scene, (uint32_t)keys[i], &last))
             continue;
         for (int k = 0; k < 3; k++)
             pixels[4 * i + k] += strength * (color[k] * pixels[4 * i + 3] - pixels[4 * i + k]);

@@ -46,6 +46,17 @@ static inline int pt_crop_rows(const struct pt_cpu_call *call, const struct view
 
 static inline uint32_t pt_lanes_left(uint32_t x, uint32_t end) { return end - x < PT_LANES ? end - x : PT_LANES; }
 
+// Which slots, ids less id_base, are of those that have ids: instance_args.
+static inline vm pt_has_ids(vi slot, uint32_t first, uint32_t count)
+{
+    return vi_lt_unsigned(vi_sub(slot, vi_set(first)), vi_set(count));
+}
+
+static inline int pt_is_of(const struct instance_args *instance, uint32_t slot)
+{
+    return slot - instance->id_first < instance->id_count;
+}
+
 // Asks for the attributes, `size` bytes a point, of the next PT_LANES pixels from x on: with large clouds each is a
 // cache miss of its own. attribute NULL: it is read from pictures, not from points.
 static inline void pt_fetch_ahead(const uint64_t *row, uint32_t x, uint32_t end, const struct instance_args *instance,
@@ -53,7 +64,7 @@ static inline void pt_fetch_ahead(const uint64_t *row, uint32_t x, uint32_t end,
 {
     for (uint32_t i = x; attribute && i < x + PT_LANES && i < end; i++) {
         uint32_t id = (uint32_t)row[i] - instance->id_base;
-        if (id < instance->id_count)
+        if (pt_is_of(instance, id))
             __builtin_prefetch((const char *)attribute + size * id);
     }
 }
@@ -79,7 +90,7 @@ static inline void pt_row_put_keys(uint64_t *row, uint32_t width, uint32_t x, vi
 static inline vm pt_of_instance(const uint64_t *keys, const struct instance_args *instance, uint32_t lanes, vi *id)
 {
     *id = vi_sub(vi_load_id(keys), vi_set(instance->id_base));
-    return vm_and(vm_first(lanes), vm_and(vi_lt_unsigned(*id, vi_set(instance->id_count)),
+    return vm_and(vm_first(lanes), vm_and(pt_has_ids(*id, instance->id_first, instance->id_count),
                                           vm_not(vi_eq(vi_load_z(keys), vi_set(PT_KEY_EMPTY_Z)))));
 }
 

@@ -73,7 +73,7 @@ int pt_gl_range_add(struct pt_gl_device *d, const struct pt_buffer *buffer, size
 struct points {
     const uint8_t *source;
     size_t each;
-    uint32_t base, count; // ids
+    uint32_t base, first, count; // as in instance_args
 };
 
 // Of the points of a buffer that the kernel asks for: those with these ids. Arguments begin with the view and the instance, but where
@@ -87,7 +87,8 @@ static struct points points_of(const struct pt_gl_work *work, const struct pt_bu
     else if (work->kernel == PT_KERNEL_shadow_test)
         points.base = ((const struct shadow_test_args *)work->arguments)->caster;
     else
-        points = (struct points){buffer->source, buffer->size / instance->id_count, instance->id_base, instance->id_count};
+        points = (struct points){buffer->source, buffer->size / instance->slots, instance->id_base, instance->id_first,
+                                 instance->id_count};
     return points;
 }
 
@@ -95,7 +96,7 @@ static void gather(const struct points *points, const uint32_t *keys, size_t cou
 {
     for (size_t i = 0; i < count; i++, to += points->each) {
         const uint32_t id = keys[2 * i] - points->base;
-        if (id >= points->count || keys[2 * i + 1] == PT_KEY_EMPTY_Z)
+        if (id - points->first >= points->count || keys[2 * i + 1] == PT_KEY_EMPTY_Z)
             continue;
         const uint8_t *from = points->source + id * points->each;
         switch (points->each) {

@@ -133,6 +133,7 @@ void pt_plan_tint(struct pt_builder *builder, enum pt_plane color)
             continue;
         struct tint_args args = {.view = pt_view_filled(plan, instance),
                                  .id_base = instance->args.id_base,
+                                 .id_first = instance->args.id_first,
                                  .id_count = instance->args.id_count,
                                  .clip_first = plan->clip_count,
                                  .eye_z = pt_eye_z(scene)};

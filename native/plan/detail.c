@@ -21,7 +21,7 @@ void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *pla
     *detail = (struct pt_detail){0};
     // Cells of range images, discs alone and maps of lights know no coarser points: a map's holes would be light.
     if (!(scene->settings.detail > 0.0f) || plan->map || scene->settings.surface == PATINA_SURFACE_SPLATS ||
-        pt_draws_ranges(scene, instance))
+        pt_draws_ranges(scene, plan, instance))
         return;
     if (cloud->clusters)
         for (uint32_t i = 0; i * PT_CLUSTER < cloud->chunk_count; i++)

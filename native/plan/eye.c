@@ -238,7 +238,6 @@ void pt_set_chunk(const struct pt_eye *camera, const struct pt_object *object, c
     out->count = count;
     out->padded = chunk->padded;
     out->cull = cull;
-    out->id_base = instance->id_base;
     out->step = instance->cloud && instance->cloud->packed ? pt_chunk_step(chunk) : 0.0f;
 }
 
@@ -249,8 +248,7 @@ void pt_set_instance(const struct pt_eye *camera, const struct pt_object *object
 {
     const struct patina_cloud *cloud = instance->cloud;
     const patina_cloud_style *style = &instance->style;
-    args->id_base = instance->id_base;
-    args->id_count = (uint32_t)cloud->slots;
+    args->slots = (uint32_t)cloud->slots;
     args->has_normals = cloud->info.has_normals;
     args->color_format = cloud->color_format ? cloud->color_format : pt_is_marked(instance) ? PT_COLOR_FLOAT : PT_COLOR_NONE;
     args->lit = style->lighting == PATINA_LIGHTING_LIT;

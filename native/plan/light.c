@@ -380,7 +380,6 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
             out->cloud_count++;
         }
     out->mesh_count = 0;
-    out->points = scene->points; // their triangles' ids follow
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         if (meshes_cast(group) && pt_mesh_casts(pt_mesh_at(scene, i)))
             *pt_mesh_at(out, out->mesh_count++) = *pt_mesh_at(scene, i);

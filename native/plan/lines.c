@@ -130,7 +130,7 @@ static void plan_ink(struct pt_builder *builder, struct ink_args args, const str
     }
     if (of_points && plan->mesh.triangles) { // behind the points' ids; in white
         args.view = all.view;
-        args.instance = (struct instance_args){.id_base = (uint32_t)builder->scene->points,
+        args.instance = (struct instance_args){.id_base = (uint32_t)plan->ids.points,
                                                .id_count = (uint32_t)builder->scene->triangles,
                                                .color = {1.0f, 1.0f, 1.0f}};
         add_ink(builder, &args, pt_nothing(), targets);

@@ -244,8 +244,8 @@ static int plan_tests(struct tests *tests, const struct pt_shadow_group *group, 
     tests->args.loss = group->loss;
     tests->args.faint = (uint32_t)group->faint;
     if (group->faint) {
-        tests->args.caster = tests->scene->instances[group->only].id_base;
-        tests->opacities = pt_buffer_of(PT_OPACITIES, 0); // the map's only instance
+        tests->args.caster = map->instances[0].args.id_base; // the map's only instance
+        tests->opacities = pt_buffer_of(PT_OPACITIES, 0);
     }
     set_window(map, window, tests->args.window);
     int error = add_tests(tests, 0);

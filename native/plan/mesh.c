@@ -147,6 +147,7 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
     // a point for each pixel, with its index as id
     args.instance = (struct instance_args){.id_base = unlit ? pixels_of(plan) : 0,
                                            .id_count = pixels_of(plan),
+                                           .slots = pixels_of(plan),
                                            .has_normals = 1,
                                            .color_format = PT_COLOR_OF_PLANE,
                                            .has_opacities = (uint32_t)blended,

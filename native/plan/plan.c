@@ -91,7 +91,7 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
     struct antialias_args args = {.view = plan->view,
                                   .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS,
                                   .behind = builder->layer > 1,
-                                  .mesh_base = (uint32_t)builder->scene->points,
+                                  .mesh_base = (uint32_t)plan->ids.points,
                                   .mesh_count = (uint32_t)builder->scene->triangles,
                                   .inked = plan->line_radius > 0.0f};
     PT_REASON(PT_ADD(builder, antialias, args,
@@ -186,7 +186,7 @@ static void set_background(const patina_settings *settings, float background[4])
 static void plan_extract(struct pt_builder *builder)
 {
     struct extract_args extract = extract_args(builder, builder->scene->settings.passes);
-    extract.centered = pt_tells_surfaces(builder) ? (uint32_t)builder->scene->points : 0;
+    extract.centered = pt_tells_surfaces(builder) ? (uint32_t)builder->plan->ids.points : 0;
     if (!extract.depth && !extract.normal && !extract.source && !extract.shadow) {
         pt_skip(builder, "extract", "no pass beside the combined one is asked for");
         return;
@@ -270,8 +270,10 @@ static void plan_marks(struct pt_builder *builder)
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunk_count || !pt_receives(instance->instance) || (blended && instance->kind == PT_AS_DISCS))
             continue;
-        struct mark_args args = {
-            .view = pt_view_filled(plan, instance), .id_base = instance->args.id_base, .id_count = instance->args.id_count};
+        struct mark_args args = {.view = pt_view_filled(plan, instance),
+                                 .id_base = instance->args.id_base,
+                                 .id_first = instance->args.id_first,
+                                 .id_count = instance->args.id_count};
         PT_REASON(PT_ADD(builder, mark, args, {pt_keys_of(builder, 0), pt_buffer_of(PT_MARKS, instance->of)}),
                   "only points of instance %u that the picture shows need shadows", i);
         marked = 1;

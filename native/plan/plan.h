@@ -214,7 +214,7 @@ struct pt_drawn_balls {
 };
 
 // What is drawn of an instance in one way. An instance in view whose points have footprints is two of these: its fine chunks as
-// points, and behind all others its wide ones as discs, with ids of their own (pt_disc_ids).
+// points, and behind all others its wide ones as discs, with ids of their own (pt_plan_ids).
 struct pt_plan_instance {
     const struct pt_instance *instance;
     uint32_t of;       // its place in the scene: shadows are kept by it
@@ -274,6 +274,17 @@ struct pt_plan_discs {
     uint32_t bins;         // of 16 bytes: pt_plan_set_bins
     uint32_t first, count; // ids whose points are discs
 };
+// The slots of a cloud that have ids: from the first of the chunks in view to the end of the last.
+struct pt_window {
+    uint32_t first, count; // slots
+    uint32_t id;           // of the first
+};
+struct pt_plan_ids {
+    struct pt_window *windows; // of the scene's clouds: their ids follow each other in this order
+    uint64_t points;           // of all windows: where triangles' ids begin
+    uint32_t discs; // the first of those that points have as discs beside others that are not; 0: everything is filled
+    int filled;     // none of these: 32 bits hold no more
+};
 struct pt_plan_images {
     uint32_t reach; // pixels, of what is drawn as range images around the picture; 0: nothing is
     uint32_t cells; // of the largest image buffer
@@ -327,6 +338,7 @@ struct pt_plan {
     struct pt_plan_instance
         *instances; // behind those that the count counts: soft ones, whole, and then what parts draw of them
     uint32_t instance_count;
+    struct pt_plan_ids ids;
     struct pt_plan_soft soft;
     struct pt_plan_discs discs;
     struct pt_plan_images ranges;
@@ -379,13 +391,11 @@ struct pt_plan {
     struct pt_arena *arena;
 };
 
-// The first of the ids that points have as discs beside others that are not; an instance's lie as its own do. 0 where 32 bits
-// hold no more: everything is filled then.
-static inline uint32_t pt_disc_ids(const struct patina_scene *scene)
-{
-    const uint64_t first = scene->points + scene->triangles;
-    return first + scene->points < 0xFFFFFFFFu ? (uint32_t)first : 0;
-}
+// ids.c: numbers what is in view, by the windows' slots. Whether 32 bits hold it, with ids of discs unless plan->ids.filled.
+int pt_plan_number(const struct patina_scene *scene, struct pt_plan *plan);
+int pt_plan_too_many(const struct patina_scene *scene, const struct pt_plan *plan); // says so
+// Gives an instance of a cloud its ids; discs: those of its points as discs (plan->ids.discs), or 0.
+void pt_set_ids(const struct pt_plan *plan, uint32_t instance, uint32_t discs, struct instance_args *args);
 
 // How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2.
 static inline double pt_thinning(const struct patina_scene *scene)
@@ -462,9 +472,9 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
 uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan *plan);
 int pt_reopen_asked(const struct pt_instance *instance); // whether what its stations saw is needed
 // window.c: whether the instance's points may be discs.
-int pt_knows_discs(const struct patina_scene *scene, const struct pt_instance *instance);
+int pt_knows_discs(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance);
 // Whether every cloud knows how far its points spread, and that is to be kept to.
-int pt_knows_reach(const struct patina_scene *scene);
+int pt_knows_reach(const struct patina_scene *scene, const struct pt_plan *plan);
 // Whether layer distances follow what an analysis found: where some surfaces lie nearer to each other than two spacings. Elsewhere
 // that tells nothing, and a million points on a torus would take a fifth longer to fill. Decided for the whole scene: a region's
 // planes are those of the whole.

@@ -23,10 +23,10 @@
 #define CROWDED 2.5f
 #define GRAZED 0.4f
 
-int pt_draws_ranges(const struct patina_scene *scene, const struct pt_instance *instance)
+int pt_draws_ranges(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance)
 {
     return (instance->style.surface == PATINA_SURFACE_RANGES || scene->settings.surface == PATINA_SURFACE_RANGES) &&
-           !pt_all_soft(instance) && pt_disc_ids(scene);
+           !pt_all_soft(instance) && !plan->ids.filled;
 }
 
 // Whether cells follow how far points lie apart, from wide ones to narrow ones.
@@ -206,6 +206,7 @@ static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_ra
                                          .with_span = plan->sigmas != 0,
                                          .pass = pass,
                                          .id_base = instance->args.id_base,
+                                         .id_first = instance->args.id_first,
                                          .id_count = instance->args.id_count,
                                          .most = range->most,
                                          .cosine = GRAZED,

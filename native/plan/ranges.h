@@ -28,7 +28,7 @@ struct pt_spread {
 // Of an instance that is drawn as them: 0: all its chunks; from 1 on finer and finer cells.
 const struct pt_range *pt_range_of(const struct pt_plan_instance *instance, uint32_t level);
 // Whether the instance is. Not where 32 bits hold no ids for it: it is filled then.
-int pt_draws_ranges(const struct patina_scene *scene, const struct pt_instance *instance);
+int pt_draws_ranges(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance);
 // The side of its cells, from the spacing of its points on screen, and of finer ones that take their place: pixels. Returns how many
 // there are, 1 to PT_RANGE_FINER + 1.
 uint32_t pt_range_pixels(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_spread *spread,

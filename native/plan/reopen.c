@@ -65,6 +65,7 @@ static struct reopen_args *arguments_of(struct pt_builder *builder, uint32_t i, 
     struct station_args *stations = (struct station_args *)(args + 1);
     *args = (struct reopen_args){.view = plan->view,
                                  .id_base = instance->args.id_base,
+                                 .id_first = instance->args.id_first,
                                  .id_count = instance->args.id_count,
                                  .phase = phase,
                                  .discs = (uint32_t)pt_kinds[instance->kind].in_planes,

@@ -68,6 +68,7 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
     bounds->z_far = own.beyond;
     depths[out->chunk_count++] = own;
     pt_set_chunk(p->eye, object, rows, out->instance, chunk, pt_drawn_points(p->scene, chunk), 0, view);
+    view->id_base = out->args.id_base;
     pt_join_rect(out->rect, bounds->rect);
     out->points += view->count;
     plan->chunks_culled -= (uint64_t)pt_all_soft(out->instance); // others may count as solid ones
@@ -94,6 +95,7 @@ static int place_instance(struct placing *p, uint32_t i)
     pt_object_of(p->eye, instance->style.world_from_object, &object);
     pt_object_rows(p->eye, &object, rows);
     pt_set_instance(p->eye, &object, instance, pt_thinning(p->scene), &out->args);
+    pt_set_ids(p->plan, i, 0, &out->args);
     out->as.balls = pt_balls_of(&(struct pt_to_place){p->scene, instance, &object});
     for (uint32_t c = 0; c < cloud->chunk_count && !error && instance->style.transparency < 1.0f; c++)
         error = place_chunk(p, out, depths, &sieve, &object, rows, &cloud->chunks[c]);

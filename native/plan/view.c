@@ -165,7 +165,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
     survey->sieves[i] = pt_sieve_make(scene, instance, PT_SOLID_POINTS, clips);
-    const int ranges = pt_draws_ranges(scene, instance), discs = pt_knows_discs(scene, instance);
+    const int ranges = pt_draws_ranges(scene, plan, instance), discs = pt_knows_discs(scene, plan, instance);
     const enum pt_kind kind = ranges ? PT_AS_RANGES : discs ? PT_AS_DISCS : PT_AS_POINTS; // that reaches farthest
     const struct pt_to_place what = {scene, instance, object};
     struct pt_detail detail;
@@ -293,7 +293,7 @@ static int choose_cells(const struct patina_scene *scene, struct pt_plan *plan, 
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++) {
         struct cells *cells = &survey->cells[i];
         *cells = (struct cells){0};
-        if (!pt_draws_ranges(scene, &scene->instances[i]))
+        if (!pt_draws_ranges(scene, plan, &scene->instances[i]))
             continue;
         error = spacing_on_screen(survey, i, i + 1, &cells->spread);
         cells->count = pt_range_pixels(scene, &scene->instances[i], &cells->spread, cells->pixels);
@@ -344,10 +344,10 @@ static void place_fine(const struct survey *survey, uint32_t i, const struct pt_
     set_place(out, cells);
 }
 
-// Instance i of the scene, its wide chunks or the others. Ids are moved by id_base. range: its image buffer, in whose cells points
+// Instance i of the scene, its wide chunks or the others. discs: as pt_set_ids has it. range: its image buffer, in whose cells points
 // are projected, or NULL.
 static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i,
-                        enum pt_kind kind, uint32_t id_base, struct pt_range *range, struct pt_plan_instance *out)
+                        enum pt_kind kind, uint32_t discs, struct pt_range *range, struct pt_plan_instance *out)
 {
     const struct pt_instance *instance = &scene->instances[i];
     const struct pt_eye *eye = range ? &range->eye : &survey->camera;
@@ -365,7 +365,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     else
         out->as.range = range;
     pt_set_instance(&survey->camera, &survey->objects[i], instance, thinned, &out->args);
-    out->args.id_base += id_base;
+    pt_set_ids(plan, i, discs, &out->args);
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
     if (!out->chunks || !out->bounds)
@@ -385,7 +385,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         uint32_t count = pt_drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
         pt_set_chunk(eye, &survey->objects[i], rows, instance, chunk, count, seen->cull, &out->chunks[out->chunk_count]);
-        out->chunks[out->chunk_count].id_base += id_base;
+        out->chunks[out->chunk_count].id_base = out->args.id_base;
         if (range) {
             pt_range_rect(range, bounds, plan->guard, cells);
             pt_join_rect(range->cells.rect, cells);
@@ -421,7 +421,7 @@ static int place_range(const struct patina_scene *scene, struct pt_plan *plan, c
     for (struct pt_range *fine = range->fine; fine; fine = fine->fine)
         if (!(fine->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *fine->chunks)))
             return PATINA_ERROR_MEMORY;
-    return place_chunks(scene, plan, survey, i, PT_AS_RANGES, pt_disc_ids(scene), range, &plan->instances[i]);
+    return place_chunks(scene, plan, survey, i, PT_AS_RANGES, plan->ids.discs, range, &plan->instances[i]);
 }
 
 static int place_instance(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i)
@@ -518,6 +518,43 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     return error;
 }
 
+// From the first to the last of the slots that are seen.
+static struct pt_window window_of(const struct patina_cloud *cloud, const struct seen *seen, uint32_t count)
+{
+    uint64_t first = cloud->slots, end = 0;
+    for (uint32_t k = 0; k < count; k++) {
+        const struct pt_chunk *chunk = &cloud->chunks[seen[k].chunk];
+        first = chunk->first < first ? chunk->first : first;
+        end = (uint64_t)chunk->first + chunk->padded > end ? (uint64_t)chunk->first + chunk->padded : end;
+    }
+    return count ? (struct pt_window){.first = (uint32_t)first, .count = (uint32_t)(end - first)} : (struct pt_window){0};
+}
+
+// Ids of what the whole picture sees: a region's are the same.
+static int number_seen(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
+{
+    plan->ids.windows = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *plan->ids.windows);
+    int error = plan->ids.windows ? look_around(scene, plan, survey) : PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
+        plan->ids.windows[i] = window_of(scene->instances[i].cloud, survey->seen[i], survey->seen_count[i]);
+    return error;
+}
+
+static int look_and_number(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
+{
+    const struct pt_plan before = *plan;
+    int error = number_seen(scene, plan, survey);
+    if (error || pt_plan_number(scene, plan))
+        return error;
+    struct pt_arena *arena = plan->arena; // anew: points that are no discs are seen less far
+    *plan = before;
+    plan->arena = arena;
+    plan->ids.filled = 1;
+    *survey = (struct survey){0};
+    error = number_seen(scene, plan, survey);
+    return error || pt_plan_number(scene, plan) ? error : pt_plan_too_many(scene, plan);
+}
+
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = {0};
@@ -532,18 +569,18 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     plan->mesh.list = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->mesh.list);
     if (!plan->instances || !plan->mesh.list)
         return PATINA_ERROR_MEMORY;
-    // 1. Spacings.
-    int error = look_around(scene, plan, &survey);
+    // 1. Spacings, and ids.
+    int error = look_and_number(scene, plan, &survey);
     if (error || (error = choose_cells(scene, plan, &survey)))
         return error;
-    plan->discs.first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
-    plan->discs.count = survey.discs ? (uint32_t)scene->points : 0;
+    plan->discs.first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : plan->ids.discs;
+    plan->discs.count = survey.discs ? (uint32_t)plan->ids.points : 0;
     plan->filled = survey.points;
     plan->reaches = plan->discs.count &&
-                    pt_knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
+                    pt_knows_reach(scene, plan); // asking takes a tenth of the frame: not where all points lie close
     plan->sigmas = pt_knows_sigmas(scene);
     pt_choose_filling(scene, plan);
-    plan->discs.count = plan->ranges.reach ? (uint32_t)scene->points
+    plan->discs.count = plan->ranges.reach ? (uint32_t)plan->ids.points
                                            : plan->discs.count; // their pixels say how far off a point fell
     pt_choose_layers(&scene->settings, plan);
     plan->reopens = pt_reopen_rounds(scene, plan);
@@ -564,7 +601,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
         error = place_instance(scene, plan, &survey, i);
     for (uint32_t i = 0; i < scene->mesh_count && !error; i++)
-        place_mesh(plan, &survey.camera, pt_mesh_at(scene, i), (uint32_t)scene->points + pt_mesh_at(scene, i)->id_base,
+        place_mesh(plan, &survey.camera, pt_mesh_at(scene, i), (uint32_t)plan->ids.points + pt_mesh_at(scene, i)->id_base,
                    &plan->mesh.list[i]);
     return error || (plan->map && !plan->soft.veils) ? error : pt_place_soft(scene, plan, &survey.camera);
 }

@@ -27,19 +27,19 @@ static int closes_by_analysis(const patina_settings *settings)
     return settings->surface == PATINA_SURFACE_AUTO && settings->fill == PATINA_FILL_CLOSED && !(settings->error_target > 0.0f);
 }
 
-int pt_knows_discs(const struct patina_scene *scene, const struct pt_instance *instance)
+int pt_knows_discs(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance)
 {
-    if (pt_draws_ranges(scene, instance))
+    if (pt_draws_ranges(scene, plan, instance))
         return 0;
     return scene->settings.surface == PATINA_SURFACE_SPLATS ||
-           (instance->cloud->shapes && closes_by_analysis(&scene->settings) && pt_disc_ids(scene));
+           (instance->cloud->shapes && closes_by_analysis(&scene->settings) && !plan->ids.filled);
 }
 
-int pt_knows_reach(const struct patina_scene *scene)
+int pt_knows_reach(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     int known = scene->settings.surface == PATINA_SURFACE_AUTO;
     for (uint32_t i = 0; i < scene->cloud_count; i++)
-        known = known && (pt_all_soft(&scene->instances[i]) || pt_knows_discs(scene, &scene->instances[i]));
+        known = known && (pt_all_soft(&scene->instances[i]) || pt_knows_discs(scene, plan, &scene->instances[i]));
     return known;
 }
 

@@ -24,7 +24,7 @@ static int bake_once(struct patina_frame *frame, const struct patina_scene *scen
     if (!plan.light_count || !scene->cloud_count)
         error = pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "shadows: no light of the scene casts any, or there is no cloud");
     if (!error)
-        error = pt_frame_number(frame, scene);
+        error = pt_frame_number(frame, scene, NULL);
     if (!error) {
         const struct pt_layer first = frame->layers[0];
         error = pt_frame_execute(frame, &whole, &plan);
@@ -69,4 +69,5 @@ void pt_frame_release(struct patina_frame *frame)
     pt_plan_buffers_release(frame->device, &frame->own);
     pt_residency_release(&frame->residency, frame->device);
     pt_numbering_release(&frame->numbering);
+    pt_numbering_release(&frame->key_ids);
 }

@@ -32,6 +32,7 @@ struct patina_frame {
     struct patina_device *device;
     struct pt_residency residency;
     struct pt_numbering numbering; // of the last scene that was rendered, baked or loaded for
+    struct pt_numbering key_ids;   // of the picture that the keys are of
     struct pt_planes planes;
     struct pt_shown shown;
     struct pt_shadows shadows;
@@ -69,9 +70,9 @@ int pt_frame_until_sound(struct patina_frame *frame, const struct patina_scene *
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);
-// The same with numbers of slots for points, discs or not; ids of triangles are not to be relied on. PATINA_ERROR_ARGUMENT where the
-// frame's last picture has not the scene's clouds.
-int pt_frame_read_slots(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size);
+int pt_frame_read_numbers(const struct patina_frame *frame, uint64_t *numbers, size_t size);
+// The same with ids as they are, which frame->key_ids knows. PATINA_ERROR_ARGUMENT where the frame's last picture has not the scene's clouds.
+int pt_frame_read_ids(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size);
 size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size);
 int pt_frame_dump(const struct patina_frame *frame, const char *folder);
 // All of the scene's shadow textures, whole, without a picture.
@@ -85,8 +86,8 @@ int pt_frame_merge(struct patina_frame *frame, const struct patina_scene *scene,
 // frame_shadow_file.c
 int pt_frame_save_shadows(const struct patina_frame *frame, const char *path);
 int pt_frame_load_shadows(struct patina_frame *frame, const struct patina_scene *scene, const char *path);
-// Takes the scene's numbering over; PATINA_ERROR_MEMORY says so.
-int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene);
+// Takes the scene's numbering over, and the ids of a plan whose keys follow (or NULL); PATINA_ERROR_MEMORY says so.
+int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan);
 void pt_frame_release(struct patina_frame *frame); // planes and resident clouds
 
 #endif

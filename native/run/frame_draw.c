@@ -8,9 +8,10 @@
 #include <math.h>
 #include <string.h>
 
-int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene)
+int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan)
 {
-    return pt_numbering_take(&frame->numbering, scene)
+    frame->keys_valid &= !plan;
+    return pt_numbering_take(&frame->numbering, scene, NULL) || (plan && pt_numbering_take(&frame->key_ids, scene, plan))
                ? pt_fail(NULL, PATINA_ERROR_MEMORY, "numbering %u instances: out of memory", scene->cloud_count)
                : PATINA_OK;
 }
@@ -139,7 +140,7 @@ static int draw_once(struct patina_frame *frame, const struct patina_scene *scen
     struct pt_plan plan;
     const double start = pt_milliseconds();
     int error = pt_plan_create(scene, &plan);
-    if (!error && (error = pt_frame_number(frame, scene)))
+    if (!error && (error = pt_frame_number(frame, scene, &plan)))
         pt_plan_destroy(&plan);
     if (!error && frame->merge && (error = pt_merge_begin(frame->merge, scene, &plan)))
         pt_plan_destroy(&plan);

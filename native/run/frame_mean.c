@@ -20,6 +20,7 @@ enum {
 // What readers see, aside while finer pictures are drawn; and the finer picture's, aside while it is read.
 struct aside {
     struct pt_buffer keys, planes[PT_PLANE_COUNT][PT_SLOTS]; // of these those of the crop
+    struct pt_numbering key_ids;
     struct pt_shown shown;
     struct pt_layer layers[PATINA_MAX_LAYERS];
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
@@ -56,6 +57,7 @@ static void swap(struct patina_frame *frame, struct aside *aside)
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         if (pt_plane_rows[p].size == PT_SIZE_CROP)
             swap_bytes(frame->planes.at[p], aside->planes[p], sizeof aside->planes[p]);
+    swap_bytes(&frame->key_ids, &aside->key_ids, sizeof aside->key_ids);
     swap_bytes(&frame->shown, &aside->shown, sizeof aside->shown);
     swap_bytes(frame->layers, aside->layers, sizeof aside->layers);
     swap_bytes(frame->skipped, aside->skipped, sizeof aside->skipped);
@@ -67,6 +69,7 @@ static void swap(struct patina_frame *frame, struct aside *aside)
 
 static void destroy_aside(struct patina_frame *frame, struct aside *aside)
 {
+    pt_numbering_release(&aside->key_ids);
     frame->device->ops->buffer_destroy(frame->device, &aside->keys);
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int slot = 0; slot < PT_SLOTS; slot++)

@@ -153,7 +153,8 @@ static int draw_map(struct part_job *job, const struct pt_round *round)
     struct pt_plan map;
     int error = pt_plan_map(job->scene, &job->plan, round, &map);
     if (error)
-        return pt_fail(&job->frame->handle, error, "a light's map: out of memory");
+        return error == PATINA_ERROR_MEMORY ? pt_fail(&job->frame->handle, error, "a light's map: out of memory")
+                                            : pt_fail_again(&job->frame->handle, error);
     struct pt_execution execution = execution_of(job, &map);
     execution.round = *round;
     if (map.pass_count)

@@ -71,14 +71,14 @@ int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
-// Keys as they lie in the plane, where points have numbers of slots.
-static int read_slots(const struct patina_frame *frame, uint64_t *keys, size_t size)
+// Keys as they lie in the plane. call: whose messages these are.
+static int read_plane(const struct patina_frame *frame, const char *call, uint64_t *keys, size_t size)
 {
     if (!frame->keys_valid)
-        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: no finished render");
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "%s: no finished render", call);
     if (size != (size_t)frame->shown.crop[2] * frame->shown.crop[3] * sizeof *keys)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_keys: %u x %u keys; got %zu bytes",
-                       frame->shown.crop[2], frame->shown.crop[3], size);
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "%s: %u x %u keys; got %zu bytes", call, frame->shown.crop[2],
+                       frame->shown.crop[3], size);
     size_t row = (size_t)frame->shown.crop[2] * sizeof *keys;
     for (uint32_t y = 0; y < frame->shown.crop[3]; y++) {
         size_t offset = ((size_t)(frame->shown.crop[1] + y) * frame->shown.plane_width + frame->shown.crop[0]) * sizeof *keys;
@@ -92,26 +92,34 @@ static int read_slots(const struct patina_frame *frame, uint64_t *keys, size_t s
 
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size)
 {
-    int error = read_slots(frame, keys, size);
+    int error = read_plane(frame, "patina_frame_read_keys", keys, size);
     if (error)
         return error;
-    return pt_numbering_keys(&frame->numbering, keys, size / sizeof *keys)
-               ? pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: a cloud in view was destroyed since")
-               : PATINA_OK;
+    error = pt_numbering_keys(&frame->key_ids, keys, size / sizeof *keys);
+    return error == PATINA_ERROR_TOO_MANY_POINTS
+               ? pt_fail(
+                     &frame->handle, error,
+                     "patina_frame_read_keys: the scene holds %llu points and triangles, whose numbers have more than 32 bits: "
+                     "patina_frame_read_numbers reads them",
+                     (unsigned long long)(frame->key_ids.points + frame->key_ids.triangles))
+           : error ? pt_fail(&frame->handle, error, "patina_frame_read_keys: a cloud in view was destroyed since")
+                   : PATINA_OK;
 }
 
-int pt_frame_read_slots(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size)
+int pt_frame_read_numbers(const struct patina_frame *frame, uint64_t *numbers, size_t size)
 {
-    int same = frame->numbering.count == scene->cloud_count;
-    for (uint32_t i = 0; same && i < scene->cloud_count; i++)
-        same = frame->numbering.clouds[i].alive == scene->instances[i].cloud->alive;
-    if (!same)
+    int error = read_plane(frame, "patina_frame_read_numbers", numbers, size);
+    if (error)
+        return error;
+    error = pt_numbering_numbers(&frame->key_ids, numbers, size / sizeof *numbers);
+    return error ? pt_fail(&frame->handle, error, "patina_frame_read_numbers: a cloud in view was destroyed since") : PATINA_OK;
+}
+
+int pt_frame_read_ids(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size)
+{
+    if (!pt_numbering_is_of(&frame->key_ids, scene))
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "the frame's last picture is of another scene");
-    int error = read_slots(frame, keys, size);
-    for (size_t i = 0; i < size / sizeof *keys && !error && frame->numbering.discs < UINT32_MAX; i++)
-        if (keys[i] >> 32 != PT_KEY_EMPTY_Z && (uint32_t)keys[i] >= frame->numbering.discs)
-            keys[i] -= frame->numbering.discs;
-    return error;
+    return read_plane(frame, "patina_frame_read_keys", keys, size);
 }
 
 int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size)

@@ -304,7 +304,7 @@ int pt_frame_load_shadows(struct patina_frame *frame, const struct patina_scene 
     if (!error)
         error = take_textures(&reader, frame, scene, &plan);
     if (!error)
-        error = pt_frame_number(frame, scene);
+        error = pt_frame_number(frame, scene, NULL);
     pt_plan_destroy(&plan);
     free(data);
     return error;

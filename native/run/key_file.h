@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 
-enum { PT_KEYS_VERSION = 1, PT_KEYS_MOST_NOTE = 1 << 20 };
+enum { PT_KEYS_VERSION = 2, PT_KEYS_MOST_NOTE = 1 << 20 };
 
 struct pt_keys_head {
     char magic[8];

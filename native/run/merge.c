@@ -149,7 +149,7 @@ int pt_merge_take(struct pt_merge *merge, struct pt_binder *binder, const struct
         rows[i] = (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID;
     for (uint32_t i = 0; i < merge->count && !error; i++)
         if (merge->files[i].head.round == at)
-            error = pt_key_file_take(&merge->files[i], merge->handle, &name, pt_parts_ids(scene), rows, width, rect[1],
+            error = pt_key_file_take(&merge->files[i], merge->handle, &name, pt_parts_ids(scene, plan), rows, width, rect[1],
                                      rect[3] - rect[1]);
     if (!error) // no pass writes beyond the rectangle's rows: planes are known to be empty there
         error = binder->device->ops->buffer_write(binder->device, keys, (size_t)rect[1] * width * sizeof *rows, rows, size);

@@ -23,8 +23,11 @@ struct pt_merge {
 const char *pt_parts_refused(const struct patina_scene *scene, const struct pt_plan *plan);
 // What a picture's keys follow from, in 64 bits: of a plan as it was made. Points count by their chunks.
 uint64_t pt_parts_digest(const struct patina_scene *scene, const struct pt_plan *plan);
-// Ids that keys of the scene's points may have lie below.
-static inline uint64_t pt_parts_ids(const struct patina_scene *scene) { return 2 * scene->points + scene->triangles; }
+// Ids that keys of the plan's points may have lie below.
+static inline uint64_t pt_parts_ids(const struct patina_scene *scene, const struct pt_plan *plan)
+{
+    return 2 * plan->ids.points + scene->triangles;
+}
 // Whose keys the pass's are; round: of the loops around a map.
 struct pt_keys_name pt_parts_name(const struct pt_plan *plan, const struct pt_pass *pass, const struct pt_round *round);
 

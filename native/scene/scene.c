@@ -66,7 +66,7 @@ int patina_scene_clear(patina_scene *scene)
     for (uint32_t i = 0; i < scene->cloud_count; i++)
         free((void *)scene->instances[i].style.ramp);
     scene->cloud_count = scene->light_count = scene->mesh_count = scene->clip_count = 0;
-    scene->points = scene->given = scene->triangles = 0;
+    scene->triangles = 0;
     return PATINA_OK;
 }
 
@@ -121,16 +121,14 @@ static void default_grey(float color[3])
         color[0] = color[1] = color[2] = 0.8f;
 }
 
-// slots, count: of what is to be added; a triangle is one of either.
-static int too_many(const patina_scene *scene, uint64_t slots, uint64_t count)
+// Of points there may be any number: a picture numbers what it sees. Of triangles it numbers all.
+static int too_many(const patina_scene *scene, uint64_t triangles)
 {
-    const uint64_t inside = scene->points + scene->triangles + slots, outside = scene->given + scene->triangles + count;
-    const uint64_t most = inside > outside ? inside : outside;
-    if (most <= 0xFFFFFFFEull)
+    if (scene->triangles + triangles <= 0xFFFFFFFEull)
         return PATINA_OK;
     return pt_fail(&scene->handle, PATINA_ERROR_TOO_MANY_POINTS,
-                   "the scene would hold %llu points and triangles with this instance; ids end at 4294967294",
-                   (unsigned long long)most);
+                   "the scene would hold %llu triangles with this instance; 4294967294 can be told apart",
+                   (unsigned long long)(scene->triangles + triangles));
 }
 
 static int check_soft(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
@@ -218,7 +216,7 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     if (!scene || !cloud || cloud->handle.magic != PT_MAGIC)
         return fail(scene, "patina_scene_add_cloud: scene or cloud is NULL or destroyed");
     int error = pt_take(&scene->handle, "patina_scene_add_cloud", style, &checked, sizeof checked);
-    if (error || (error = check_style(scene, &checked, cloud)) || (error = too_many(scene, cloud->slots, cloud->info.count)))
+    if (error || (error = check_style(scene, &checked, cloud)))
         return error;
     void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room,
                        sizeof *scene->instances);
@@ -230,11 +228,8 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
                        scene->cloud_count);
     struct pt_instance *added = &scene->instances[scene->cloud_count];
     memmove(added + 1, added, scene->mesh_count * sizeof *added);
-    *added = (struct pt_instance){
-        .source = PT_SOURCE_CLOUD, .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points};
+    *added = (struct pt_instance){.source = PT_SOURCE_CLOUD, .cloud = cloud, .style = checked};
     scene->cloud_count++;
-    scene->points += cloud->slots;
-    scene->given += cloud->info.count;
     return PATINA_OK;
 }
 
@@ -266,7 +261,7 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
         return fail(scene, "mesh style: exact is 0 or 1");
     if (!checked.exact)
         default_grey(checked.color);
-    error = too_many(scene, mesh->info.triangle_count, mesh->info.triangle_count);
+    error = too_many(scene, mesh->info.triangle_count);
     if (error)
         return error;
     void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room,

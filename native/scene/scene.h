@@ -14,7 +14,7 @@ enum pt_source { PT_SOURCE_CLOUD, PT_SOURCE_MESH };
 
 struct pt_instance {
     enum pt_source source;
-    uint32_t id_base; // of its first point, or of its first triangle among triangles
+    uint32_t id_base; // of a mesh's first triangle among triangles
     union {
         const struct patina_cloud *cloud;
         const struct patina_mesh *mesh;
@@ -27,15 +27,13 @@ struct pt_instance {
 
 struct patina_scene {
     struct pt_handle handle;
-    struct pt_instance *instances; // those of clouds, whose numbers callers know; behind them those of meshes: so do their ids
+    struct pt_instance *instances; // those of clouds, whose numbers callers know; behind them those of meshes: so do ids
     uint32_t cloud_count, mesh_count, instance_room;
     patina_light_desc *lights;
     uint32_t light_count, light_room;
     uint64_t triangles; // of all meshes
     patina_clip *clips; // defaults made explicit
     uint32_t clip_count, clip_room;
-    uint64_t points; // of all instances: slots, which ids count
-    uint64_t given;  // of all instances, as callers count them
     patina_camera camera;
     int has_camera;
     patina_settings settings; // defaults made explicit

@@ -21,7 +21,7 @@ void main()
     uint at = y * args.view.width + x;
     uvec2 key = read_key(at);
     uint id = key.x - args.instance.id_base, to = (y - args.crop_y) * args.crop_width + x - args.crop_x;
-    bool ours = key.y != PT_KEY_EMPTY_Z && id < args.instance.id_count;
+    bool ours = key.y != PT_KEY_EMPTY_Z && id - args.instance.id_first < args.instance.id_count;
     if (!ours && args.first == 0u)
         return;
     uint word = ours ? shapes[pt_place_of(id, at)] : 0u, sigma_class = word >> PT_SHAPE_SIGMA_SHIFT & PT_SHAPE_CLASS_BITS;

@@ -49,7 +49,7 @@ vec3 albedo_of(uint id)
     return vec3(args.instance.color[0], args.instance.color[1], args.instance.color[2]);
 }
 
-bool is_ours(uvec2 key) { return key.y != PT_KEY_EMPTY_Z && key.x - args.instance.id_base < args.instance.id_count; }
+bool is_ours(uvec2 key) { return key.y != PT_KEY_EMPTY_Z && (key.x - args.instance.id_base) - args.instance.id_first < args.instance.id_count; }
 
 #if STEP == 0
 

@@ -185,7 +185,7 @@ look look_of(disc d)
     l.opaque = opaque;
     for (uint k = 0u; k < PT_BLEND_LIGHTS; k++) {
         bool known = k < args.lights && discs[instance].shadowed != 0u;
-        uint at = (args.first + k) * discs[instance].instance.id_count + d.id;
+        uint at = (args.first + k) * discs[instance].instance.slots + d.id;
         precise float share = known ? float(words[at] & PT_SHADOW_SUM) * args.scales[k] : 0.0;
         precise float lost = pt_min(share, 1.0) * opaque;
         l.lost[k] = lost;
@@ -274,7 +274,7 @@ uint instance_of(uint id)
 {
     uint at = args.instances;
     for (uint i = 0u; i < args.instances; i++)
-        at = id - discs[i].instance.id_base < discs[i].instance.id_count ? i : at;
+        at = (id - discs[i].instance.id_base) - discs[i].instance.id_first < discs[i].instance.id_count ? i : at;
     return at;
 }
 

@@ -105,7 +105,7 @@ vec3 light(point p)
     precise vec3 unit = n * pt_rsqrt(known ? square : 1.0);
     float shadow;
     color = phong(view, args.eye_z, vec3(args.instance.ambient, args.instance.diffuse, args.instance.specular), args.instance.shininess,
-                  p.id, args.instance.id_count, pixel(p.z, ray, known ? unit : vec3(0.0, 0.0, 1.0), color), shadow);
+                  p.id, args.instance.slots, pixel(p.z, ray, known ? unit : vec3(0.0, 0.0, 1.0), color), shadow);
 #endif
     return color;
 }

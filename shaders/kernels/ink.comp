@@ -59,7 +59,7 @@ void main()
         return;
     uvec2 key = read_key(nearest[at]);
     uint id = key.x - args.instance.id_base;
-    if (id >= args.instance.id_count)
+    if (id - args.instance.id_first >= args.instance.id_count)
         return;
     float z = pt_float(key.y);
     if (args.color_target != 0u)

@@ -175,7 +175,7 @@ void main()
         for (int k = 0; k < 4; k++)
             take_faces(k % 2 + 3 * (k / 2), true);
     uvec2 before = keys[at];
-    bool own = (args.pass & PT_RANGE_FINE) != 0u && before.y < PT_KEY_EMPTY_Z && before.x - args.id_base < args.id_count;
+    bool own = (args.pass & PT_RANGE_FINE) != 0u && before.y < PT_KEY_EMPTY_Z && (before.x - args.id_base) - args.id_first < args.id_count;
     if (own) { // what may take the place of what is there, whose mark is taken away
         float mark = away_from[at], z = pt_float(before.y), most = step_from(z);
         precise float unmarked = -1.0 - mark, nearer = z - most, near = z + most;

@@ -13,12 +13,12 @@ layout(std430, binding = BIND_marks) buffer marks_block { uint marks[]; }; // fo
 void main()
 {
     view_args view = args.view;
-    uint id_base = args.id_base, id_count = args.id_count;
+    uint id_base = args.id_base, id_first = args.id_first, id_count = args.id_count;
     uvec2 here = pt_tile_line(view);
     for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
         uvec2 key = read_key(here.y * view.width + here.x);
         uint id = key.x - id_base;
-        if (id < id_count && key.y != PT_KEY_EMPTY_Z)
+        if (id - id_first < id_count && key.y != PT_KEY_EMPTY_Z)
             atomicOr(marks[id >> 2], 1u << 8u * (id & 3u));
     }
 }

@@ -130,12 +130,12 @@ vec3 fit(view_args view, window_sums s, float w, vec2 ray)
     return found ? unit : vec3(0.0);
 }
 
-void normal_pixel(view_args view, int radius, bool steep, uint id_base, uint id_count, float d_min, uint x, uint y)
+void normal_pixel(view_args view, int radius, bool steep, uint id_base, uint id_first, uint id_count, float d_min, uint x, uint y)
 {
     uint at = y * view.width + x;
     uvec2 key = read_key(at);
     uint id = key.x - id_base;
-    if (key.y == PT_KEY_EMPTY_Z || id >= id_count)
+    if (key.y == PT_KEY_EMPTY_Z || id - id_first >= id_count)
         return;
     float z = pt_float(key.y), w = linear_depth(view, z);
     float spacing = args.instance.spacing[surfels[pt_place_of(id, at)] >> PT_SPACING_SHIFT];
@@ -155,11 +155,11 @@ void normal_pixel(view_args view, int radius, bool steep, uint id_base, uint id_
 void main()
 {
     view_args view = args.view;
-    uint id_base = args.instance.id_base, id_count = args.instance.id_count;
+    uint id_base = args.instance.id_base, id_first = args.instance.id_first, id_count = args.instance.id_count;
     float d_min = args.instance.d_min;
     int radius = int(args.radius);
     bool steep = args.steep != 0u;
     uvec2 here = pt_tile_line(view);
     for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP)
-        normal_pixel(view, radius, steep, id_base, id_count, d_min, here.x, here.y);
+        normal_pixel(view, radius, steep, id_base, id_first, id_count, d_min, here.x, here.y);
 }

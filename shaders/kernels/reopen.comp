@@ -85,7 +85,7 @@ bool closed(uvec2 pixel, uint at, uint source)
     return most < square;
 }
 
-bool is_ours(uvec2 key) { return key.y != PT_KEY_EMPTY_Z && key.x - args.id_base < args.id_count; }
+bool is_ours(uvec2 key) { return key.y != PT_KEY_EMPTY_Z && (key.x - args.id_base) - args.id_first < args.id_count; }
 
 void take(uvec2 pixel, uint at, uint source)
 {

@@ -27,7 +27,7 @@ layout(std430, binding = BIND_span) writeonly buffer span_block { float span[]; 
 #endif
 
 struct instance_part {
-    uint id_base, id_count;
+    uint id_base, id_first, id_count;
     float d_min, sigma_scale;
     vec3 rows[3]; // of the normal matrix
 };
@@ -38,7 +38,7 @@ void resolve_pixel(view_args view, instance_part instance, uint x, uint y)
     // 1. the point
     uvec2 key = read_key(at);
     uint id = key.x - instance.id_base;
-    if (id >= instance.id_count || key.y == PT_KEY_EMPTY_Z)
+    if (id - instance.id_first >= instance.id_count || key.y == PT_KEY_EMPTY_Z)
         return;
     float z = pt_float(key.y);
     vec2 ray = pt_ray(view, int(x), int(y));
@@ -85,6 +85,7 @@ void main()
     view_args view = args.view;
     instance_part instance;
     instance.id_base = args.instance.id_base;
+    instance.id_first = args.instance.id_first;
     instance.id_count = args.instance.id_count;
     instance.d_min = args.instance.d_min;
     instance.sigma_scale = args.sigma_scale;

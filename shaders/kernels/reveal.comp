@@ -17,7 +17,7 @@ void main()
         return;
     uint at = y * args.view.width + x;
     uvec2 key = read_key(at);
-    bool ours = key.y != PT_KEY_EMPTY_Z && key.x - args.instance.id_base < args.instance.id_count;
+    bool ours = key.y != PT_KEY_EMPTY_Z && (key.x - args.instance.id_base) - args.instance.id_first < args.instance.id_count;
     if (ours || args.first != 0u)
         disagreement[(y - args.crop_y) * args.crop_width + x - args.crop_x] = ours ? read_deff(read_from(at)) : 0.0;
 }

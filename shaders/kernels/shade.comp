@@ -154,7 +154,7 @@ vec3 blend_wide(view_args view, ivec2 size, int x, int y, float z, float limit)
 void main()
 {
     view_args view = args.view;
-    uint id_base = args.instance.id_base, id_count = args.instance.id_count;
+    uint id_base = args.instance.id_base, id_first = args.instance.id_first, id_count = args.instance.id_count;
     uint shininess = args.instance.shininess;
     float instance_opacity = args.instance.opacity, eye_z = args.eye_z;
     vec3 factors = vec3(args.instance.ambient, args.instance.diffuse, args.instance.specular);
@@ -190,7 +190,7 @@ void main()
         if (own.source != at)
             p.n = finish_blend(blend_wide(view, size, x, y, p.z, read_deff(own.source)), p.n);
 #endif
-        if (id < id_count && own.key.y != PT_KEY_EMPTY_Z) {
+        if (id - id_first < id_count && own.key.y != PT_KEY_EMPTY_Z) {
             // 2. colour and opacity
             uint place = pt_place_of(id, at), of_color = COLOR_FORMAT == 5 ? at : own.source;
             float opacity = opacity_of(instance_opacity, place, of_color);
@@ -204,7 +204,7 @@ void main()
 #if LIT
             bool of_pixels = args.of_pixels != 0u;
             vec3 c = phong(view, eye_z, factors, shininess, of_pixels ? own.source : id,
-                           of_pixels ? view.width * view.height : id_count, p, shadow);
+                           of_pixels ? view.width * view.height : args.instance.slots, p, shadow);
 #else
             vec3 c = p.albedo;
 #endif

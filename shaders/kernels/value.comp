@@ -17,7 +17,7 @@ void main()
         uint at = here.y * view.width + here.x;
         uvec2 key = read_key(at);
         uint id = key.x - args.instance.id_base;
-        bool ours = key.y != PT_KEY_EMPTY_Z && id < args.instance.id_count;
+        bool ours = key.y != PT_KEY_EMPTY_Z && id - args.instance.id_first < args.instance.id_count;
         if (!ours && args.first == 0u)
             continue;
         float scalar = ours ? scalars[pt_place_of(id, at)] : 0.0;

@@ -51,7 +51,7 @@ PT_FUNCTION PT_STRUCT tint_band tint_select(vm m, PT_STRUCT tint_band a, PT_STRU
 
 PT_BODY(tint)
 {
-    vm ours = vm_and(HERE.some, vi_lt_unsigned(vi_sub(HERE.id, vi_set(ARGS.id_base)), vi_set(ARGS.id_count)));
+    vm ours = vm_and(HERE.some, vi_lt_unsigned(vi_sub(vi_sub(HERE.id, vi_set(ARGS.id_base)), vi_set(ARGS.id_first)), vi_set(ARGS.id_count)));
     if (!vm_any(ours))
         return;
     vf ray[2];

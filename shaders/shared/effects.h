@@ -9,7 +9,7 @@
 // box that cuts or before a plane; weight = strength clamp((width - d) / footprint + 1/2), of the clip where it is greatest.
 struct tint_args {
     struct view_args view;
-    uint32_t id_base, id_count; // pixels of this instance
+    uint32_t id_base, id_first, id_count; // pixels of this instance: as in instance_args
     uint32_t clip_first, clip_count;
     float eye_z; // as in shade_args
 };

@@ -72,7 +72,7 @@ struct fill_args {
 //   SHOW: their colours become magenta.
 struct reopen_args {
     struct view_args view;
-    uint32_t id_base, id_count; // pixels of this instance
+    uint32_t id_base, id_first, id_count; // pixels of this instance: as in instance_args
     uint32_t phase;             // PT_REOPEN_*
     uint32_t first, last;
     uint32_t discs;             // 1: the away plane holds

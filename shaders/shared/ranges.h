@@ -74,7 +74,7 @@ struct magnify_args {
     uint32_t behind; // 1: the limit plane holds
     uint32_t with_span; // as in resolve_args
     uint32_t pass;      // bits PT_RANGE_*
-    uint32_t id_base, id_count; // of the instance
+    uint32_t id_base, id_first, id_count; // as in instance_args
     float most;         // where finer ones follow: cells of more points are not sharp
     float cosine;       // nor are those that are seen at less of it
     uint32_t with_apart; // 1: the apart plane takes max(most - least, 0) of the corner that weighs most: differ

@@ -17,7 +17,7 @@
 // mark: a byte of 1 for every point that the picture shows, measured or as the source of filled pixels.
 struct mark_args {
     struct view_args view;
-    uint32_t id_base, id_count;
+    uint32_t id_base, id_first, id_count; // as in instance_args
 };
 
 // shadow_test: points against the filled map of a light [D 6], SPEC 4. A point is in shadow if z > z_map + d_eff, d_eff of the point in
@@ -40,7 +40,7 @@ struct shadow_test_args {
     uint32_t samples; // with this one
     uint32_t compare; // 1: differs[0] becomes 1 unless every point's samples lost the same
     uint32_t marked;  // 1: only points with a mark
-    uint32_t faint, caster; // caster: first id of the only cloud that casts
+    uint32_t faint, caster; // caster: id_base of the only cloud that casts
 };
 
 // dim: points behind the soft points of a light's view, SPEC 5. -ln of the light that comes through is that of the veil plane's texels
@@ -58,7 +58,7 @@ struct dim_args {
 // shows takes all light: opacity and loss are 255.
 struct limit_args {
     struct view_args view;
-    uint32_t caster; // first id of the only cloud that casts
+    uint32_t caster; // id_base of the only cloud that casts
     uint32_t loss;   // as in shadow_test_args
 };
 

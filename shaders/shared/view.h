@@ -75,7 +75,9 @@ struct chunk_view {
 
 // What the per-instance kernels (normals, resolve, shade) know of an instance of a cloud.
 struct instance_args {
-    uint32_t id_base, id_count; // ids of this instance: [id_base, id_base + id_count)
+    uint32_t id_base;            // a slot of the cloud and this, which may wrap, are its id
+    uint32_t id_first, id_count; // slots that have ids: [id_first, id_first + id_count). What other ids show is of others
+    uint32_t slots;              // of the cloud: words of one light's shadows
     uint32_t has_normals;
     uint32_t color_format;      // 0 style colour, 1 sRGB 8 bit x 3, 2 float x 3, 3 a plane; shade: 4 scalars, 5 a plane
     uint32_t lit;

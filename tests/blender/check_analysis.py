@@ -98,7 +98,7 @@ def test_certainty_and_thickness():
     layer.patina.use_pass_certainty = layer.patina.use_pass_thickness = layer.use_pass_object_index = True
     known.pass_index = 7
     picture = render()
-    ids = (written[-1][1]["KEYS"][..., 0] & np.uint64(0xFFFFFFFF)).astype(np.int64)
+    ids = written[-1][1]["NUMBERS"][..., 0].astype(np.int64)
     shows = next(values for name, values in picture.items() if name in ("IndexOB", "Object Index"))[..., 0] == 7
     check(shows.sum() > 500 and not shows[:, 80:].any(), f"{shows.sum()} pixels")
     cloud, = (cloud for _, cloud in clouds.CACHE._entries.values() if cloud.has_shapes)

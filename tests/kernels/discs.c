@@ -13,6 +13,7 @@ void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene
     struct disc_args *discs = &scene->discs[instance];
     *discs = (struct disc_args){.instance = {.id_base = cloud->chunks[0].id_base,
                                              .id_count = cloud->slots,
+                                             .slots = cloud->slots,
                                              .has_normals = has_normals != 0,
                                              .opacity = 1.0f},
                                 .has_radii = radius == 0.0f,

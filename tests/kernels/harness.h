@@ -100,6 +100,8 @@ struct picture {
 };
 struct picture picture_random(struct harness *h, struct rng *rng, struct view_args view, enum picture_kind kind,
                               double density);
+// The instance's slots; of the first of them the ids are others'.
+void picture_slots(struct instance_args *instance, size_t slots);
 // Empty pixels take over the surface of a measured one up to `reach` pixels away, with this probability.
 void picture_invent(struct picture *picture, struct rng *rng, double share, int reach);
 // The pyramid's level above these keys (allocated); view becomes that level's.

@@ -161,6 +161,13 @@ struct picture picture_random(struct harness *h, struct rng *rng, struct view_ar
     return out;
 }
 
+void picture_slots(struct instance_args *instance, size_t slots)
+{
+    instance->slots = (uint32_t)slots;
+    instance->id_first = (uint32_t)slots / 16;
+    instance->id_count = instance->slots - instance->id_first;
+}
+
 void picture_invent(struct picture *picture, struct rng *rng, double share, int reach)
 {
     int width = (int)picture->view.width, height = (int)picture->view.height;

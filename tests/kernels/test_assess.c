@@ -20,7 +20,7 @@ static struct setup make(struct harness *h, struct rng *rng, enum picture_kind k
     const uint32_t count = (uint32_t)s.picture.count;
     memcpy(s.crop, crop, sizeof s.crop);
     s.args = (struct assess_args){.view = s.picture.view,
-                                  .instance = {.id_base = s.picture.id_base + count / 8, .id_count = count / 2},
+                                  .instance = {.id_base = s.picture.id_base, .id_first = count / 8, .id_count = count / 2},
                                   .crop_x = crop[0],
                                   .crop_y = crop[1],
                                   .crop_width = crop[2],
@@ -34,7 +34,7 @@ static struct setup make(struct harness *h, struct rng *rng, enum picture_kind k
     s.args.view.rect[3] = crop[1] + crop[3];
     for (int k = 0; k < PT_SPACINGS; k++)
         s.args.instance.spacing[k] = (float)(0.001 * exp2(k / 4.0)); // of class 0, too: it must not matter
-    s.shape_count = count / 2;
+    s.shape_count = count / 8 + count / 2;
     s.shapes = harness_alloc(h, s.shape_count * 4);
     for (size_t i = 0; i < s.shape_count; i++) {
         s.shapes[i] = rng_below(rng, 0xFFFFFFFFu);

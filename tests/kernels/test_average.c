@@ -30,6 +30,7 @@ static struct setup look_at(struct harness *h, struct rng *rng, uint32_t width, 
     s.args.normals = (uint32_t)normals;
     *instance = (struct instance_args){.id_base = 7000,
                                        .id_count = cloud->slots,
+                                       .slots = cloud->slots,
                                        .has_normals = 1,
                                        .color_format = format,
                                        .opacity = 1.0f,

@@ -74,6 +74,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, ui
     s.lights.world[0] = s.lights.world[1] = s.lights.world[2] = 0.5f;
     *instance = (struct instance_args){.id_base = 70,
                                        .id_count = cloud->slots,
+                                       .slots = cloud->slots,
                                        .has_normals = 1,
                                        .color_format = format,
                                        .lit = 1,

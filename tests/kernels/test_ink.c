@@ -122,6 +122,7 @@ static void strangers(struct harness *h)
         struct setup s = make(h, &rng, crops[i % 2], 1, 1);
         memcpy(s.args.view.rect, rects[i], sizeof rects[i]);
         s.args.instance.id_count /= 2;
+        s.args.instance.id_first = s.args.instance.id_count / 8;
         s.args.mask = s.args.depth = s.args.blank = 1;
         check(h, &s);
     }

@@ -42,7 +42,8 @@ static struct setup make(struct harness *h, struct rng *rng, uint32_t width, uin
     s.keys = harness_alloc(h, pixels * 8);
     s.limit = harness_alloc(h, pixels * 4);
     s.away = harness_alloc(h, pixels * 4);
-    s.args.id_base = 500;
+    s.args.id_base = 491;
+    s.args.id_first = 9;
     s.args.id_count = (uint32_t)count;
     s.args.most = 7.0f;
     s.args.cosine = 0.7f;
@@ -113,7 +114,7 @@ static void compare(struct harness *h, const struct setup *s, const struct shown
     const struct ref_magnify expected = ref_magnify(&s->args, s->cells, s->places, s->merged, s->inclined, x, y);
     const double before = ref_key_z(s->keys[at]), limit = (double)s->limit[at];
     const uint32_t of = ref_key_id(s->keys[at]) - s->args.id_base;
-    const int own = s->args.pass & PT_RANGE_FINE && isfinite(before) && of < s->args.id_count;
+    const int own = s->args.pass & PT_RANGE_FINE && isfinite(before) && of - s->args.id_first < s->args.id_count;
     const int marked = own && s->away[at] < 0.0f;
     const enum ref_truth front = own ? takes(s, &expected, before, marked) : expected.z < before ? REF_YES : REF_NO;
     const int shown = expected.shown && front == REF_YES && (!s->args.behind || expected.z > limit);

@@ -25,8 +25,12 @@ static struct setup look_at(struct harness *h, struct rng *rng, uint32_t width, 
     const struct camera camera = points_look(rng, &s.scene.view, focal, 4.0);
     struct cloud *cloud = points_add_cloud(h, rng, &s.scene, &camera, counts, chunks, 1, 7000);
     s.args.view = s.scene.view;
-    s.args.instance = (struct instance_args){
-        .id_base = 7000, .id_count = cloud->slots, .color_format = format, .opacity = 0.75f, .color = {0.2f, 0.7f, 3.0f}};
+    s.args.instance = (struct instance_args){.id_base = 7000,
+                                             .id_count = cloud->slots,
+                                             .slots = cloud->slots,
+                                             .color_format = format,
+                                             .opacity = 0.75f,
+                                             .color = {0.2f, 0.7f, 3.0f}};
     s.args.gamma = 0.6f;
     points_scatter_about(rng, cloud, 1.0);
     s.color_bytes = (size_t)cloud->slots * (format == 2 ? 12 : 3) + 4;

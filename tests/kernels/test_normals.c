@@ -12,7 +12,7 @@ static struct normals_args arguments(const struct picture *picture, uint32_t rad
 {
     struct normals_args args = {.view = picture->view, .radius = radius, .steep = steep};
     args.instance.id_base = picture->id_base;
-    args.instance.id_count = (uint32_t)(picture->count * 3 / 4); // the rest belongs to somebody else, and counts as neighbour
+    picture_slots(&args.instance, picture->count * 3 / 4); // the rest belongs to somebody else, and counts as neighbour
     for (int i = 0; i < PT_SPACINGS; i++)
         args.instance.spacing[i] = (float)(1e-4 * pow(1.2, i));
     return args;
@@ -30,7 +30,7 @@ static float *run(struct harness *h, const struct picture *picture, const struct
                   const float *before)
 {
     struct pt_buffer *keys = harness_buffer(h, picture->keys, picture->count * 8);
-    struct pt_buffer *surfels = harness_buffer(h, words, (size_t)(args->instance.id_count + !args->instance.id_count) * 4);
+    struct pt_buffer *surfels = harness_buffer(h, words, (size_t)(args->instance.slots + !args->instance.slots) * 4);
     struct pt_buffer *normal = harness_buffer(h, before, picture->count * 16);
     HARNESS_RUN(h, normals, args, keys, surfels, normal);
     float *got = harness_read(h, normal);
@@ -99,7 +99,7 @@ static void kinds(struct harness *h)
                 struct picture picture = picture_random(h, &rng, picture_view(45, 29, p), (enum picture_kind)kind,
                                                         densities[d]);
                 struct normals_args args = arguments(&picture, d == 0 ? 16 : 1 + rng_below(&rng, 6));
-                check(h, &picture, &args, words_without(h, &rng, args.instance.id_count));
+                check(h, &picture, &args, words_without(h, &rng, args.instance.slots));
             }
 }
 
@@ -110,7 +110,8 @@ static void shapes(struct harness *h)
         struct rng rng = {s};
         struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_SURFACES, 0.9);
         struct normals_args args = arguments(&picture, 16);
-        args.instance.id_count = (uint32_t)picture.count;
+        args.instance.id_first = 0;
+        args.instance.slots = args.instance.id_count = (uint32_t)picture.count;
         check(h, &picture, &args, words_without(h, &rng, picture.count));
     }
 }
@@ -129,7 +130,8 @@ static void lines(struct harness *h)
                                               : REF_EMPTY_KEY;
             }
         struct normals_args args = arguments(&picture, 16);
-        args.instance.id_count = (uint32_t)picture.count;
+        args.instance.id_first = 0;
+        args.instance.slots = args.instance.id_count = (uint32_t)picture.count;
         args.instance.d_min = 10.0f;
         check(h, &picture, &args, words_without(h, &rng, picture.count));
     }
@@ -153,7 +155,8 @@ static void analytic(struct harness *h)
                                                                     : REF_EMPTY_KEY;
                 }
                 struct normals_args args = arguments(&picture, 3);
-                args.instance.id_count = (uint32_t)picture.count;
+                args.instance.id_first = 0;
+                args.instance.slots = args.instance.id_count = (uint32_t)picture.count;
                 args.instance.d_min = 1000.0f;
                 uint32_t *words = words_without(h, &rng, picture.count);
                 const float *got = run(h, &picture, &args, words, picture.normal);
@@ -193,7 +196,8 @@ static void steep_plane(struct harness *h)
     size_t found[2] = {0};
     for (steep = 0; steep < 2; steep++) {
         struct normals_args args = arguments(&picture, 3);
-        args.instance.id_count = (uint32_t)picture.count;
+        args.instance.id_first = 0;
+        args.instance.slots = args.instance.id_count = (uint32_t)picture.count;
         for (int i = 0; i < PT_SPACINGS; i++)
             args.instance.spacing[i] = 1e-4f;
         uint32_t *words = words_without(h, &rng, picture.count);

@@ -51,7 +51,8 @@ static struct setup make(struct harness *h, struct rng *rng, enum picture_kind k
     s.color = harness_alloc(h, count * 16);
     s.kept = harness_alloc(h, count * 8);
     s.all.args = (struct reopen_args){.view = s.picture.view,
-                                      .id_base = s.picture.id_base + (uint32_t)count / 8,
+                                      .id_base = s.picture.id_base,
+                                      .id_first = (uint32_t)count / 8,
                                       .id_count = (uint32_t)count / 2,
                                       .first = 1,
                                       .stations = STATIONS,
@@ -124,7 +125,8 @@ static uint64_t left(const struct setup *s, int x, int y, size_t at, int *unsure
     const uint64_t kept = s->kept[at];
     if (s->picture.from[at] == at)
         return REF_EMPTY_KEY;
-    const int ours = !isinf(ref_key_z(kept)) && ref_key_id(kept) - s->all.args.id_base < s->all.args.id_count;
+    const int ours = !isinf(ref_key_z(kept)) &&
+                     ref_key_id(kept) - s->all.args.id_base - s->all.args.id_first < s->all.args.id_count;
     if (!s->all.args.discs || !ours || !(s->away[at] > 4.0f))
         return kept;
     const enum ref_truth seen = seen_at(s, x, y, ref_key_z(kept));

@@ -11,7 +11,7 @@ static struct resolve_args arguments(const struct picture *picture, struct rng *
 {
     struct resolve_args args = {.view = picture->view};
     args.instance.id_base = picture->id_base;
-    args.instance.id_count = (uint32_t)(picture->count * 3 / 4);
+    picture_slots(&args.instance, picture->count * 3 / 4);
     args.instance.has_normals = 1;
     for (int i = 0; i < PT_SPACINGS; i++)
         args.instance.spacing[i] = (float)(1e-4 * pow(1.2, i));
@@ -49,11 +49,11 @@ static void check_shapes(struct harness *h, const struct picture *picture, const
         from[i] = 0xABCDEF01u;
     }
     struct pt_buffer *keys_buffer = harness_buffer(h, picture->keys, count * 8);
-    struct pt_buffer *words_buffer = harness_buffer(h, words, (size_t)args->instance.id_count * 4);
+    struct pt_buffer *words_buffer = harness_buffer(h, words, (size_t)args->instance.slots * 4);
     struct pt_buffer *normal_buffer = harness_buffer(h, estimate, count * 16);
     struct pt_buffer *deff_buffer = harness_buffer(h, deff, count * 4);
     struct pt_buffer *from_buffer = harness_buffer(h, from, count * 4);
-    struct pt_buffer *shapes_buffer = harness_buffer(h, shapes ? shapes : words, (size_t)args->instance.id_count * 4);
+    struct pt_buffer *shapes_buffer = harness_buffer(h, shapes ? shapes : words, (size_t)args->instance.slots * 4);
     struct pt_buffer *span_buffer = harness_buffer(h, span, count * 4);
     HARNESS_RUN(h, resolve, args, keys_buffer, words_buffer, normal_buffer, deff_buffer, from_buffer, shapes_buffer,
                 span_buffer);
@@ -107,7 +107,7 @@ static void random_normals(struct harness *h)
             struct picture picture = picture_random(h, &rng, picture_view(shapes[s][0], shapes[s][1], p),
                                                     s % 2 ? PICTURE_RANGE : PICTURE_SURFACES, 0.8);
             struct resolve_args args = arguments(&picture, &rng);
-            check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 0), picture.normal);
+            check(h, &picture, &args, random_words(h, &rng, args.instance.slots, 0), picture.normal);
         }
 }
 
@@ -124,7 +124,7 @@ static void estimated(struct harness *h)
             if (rng_below(&rng, 4) == 0)
                 memset(picture.normal + 4 * i, 0, 16);
         }
-        check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 1), picture.normal);
+        check(h, &picture, &args, random_words(h, &rng, args.instance.slots, 1), picture.normal);
     }
 }
 
@@ -145,7 +145,7 @@ static void matrices(struct harness *h)
             struct picture picture = picture_random(h, &rng, picture_view(35, 17, p), PICTURE_SURFACES, 0.9);
             struct resolve_args args = arguments(&picture, &rng);
             memcpy(args.instance.normal_matrix, special[s], sizeof special[s]);
-            check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 0), picture.normal);
+            check(h, &picture, &args, random_words(h, &rng, args.instance.slots, 0), picture.normal);
         }
 }
 
@@ -162,7 +162,7 @@ static void distances(struct harness *h)
             args.instance.d_min = d_min[s];
             for (int i = 0; i < PT_SPACINGS; i++)
                 args.instance.spacing[i] = s == 1 && i % 2 ? 0.0f : args.instance.spacing[i];
-            check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 0), picture.normal);
+            check(h, &picture, &args, random_words(h, &rng, args.instance.slots, 0), picture.normal);
         }
 }
 
@@ -177,10 +177,10 @@ static void sigmas(struct harness *h)
             args.instance.has_normals = (uint32_t)spans;
             args.sigma_scale = 0.0625f;
             args.with_span = (uint32_t)spans;
-            uint32_t *shapes = random_words(h, &rng, args.instance.id_count, 0);
-            for (size_t i = 0; i < args.instance.id_count; i += 3)
+            uint32_t *shapes = random_words(h, &rng, args.instance.slots, 0);
+            for (size_t i = 0; i < args.instance.slots; i += 3)
                 shapes[i] &= ~(63u << PT_SHAPE_SIGMA_SHIFT); // not known
-            check_shapes(h, &picture, &args, random_words(h, &rng, args.instance.id_count, !spans), shapes, picture.normal);
+            check_shapes(h, &picture, &args, random_words(h, &rng, args.instance.slots, !spans), shapes, picture.normal);
         }
 }
 
@@ -191,7 +191,7 @@ static void rectangle(struct harness *h)
     struct resolve_args args = arguments(&picture, &rng);
     const uint32_t rect[4] = {5, 7, 38, 40};
     memcpy(args.view.rect, rect, sizeof rect);
-    check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 0), picture.normal);
+    check(h, &picture, &args, random_words(h, &rng, args.instance.slots, 0), picture.normal);
 }
 
 // Reference alone: corners and middle of the octahedron, a surface seen at 60 degrees.
@@ -217,7 +217,7 @@ static void sanity(struct harness *h)
     float normal[4] = {(float)sqrt(0.75), 0.0f, 0.5f, 0.0f};
     uint32_t words[4] = {0, 0, 0, PT_NORMAL_NONE | 1u << 26};
     struct resolve_args args = {.view = {.width = 1, .height = 1, .footprint = 0.25f}};
-    args.instance.id_count = 4;
+    picture_slots(&args.instance, 4);
     args.instance.spacing[1] = 0.5f; // twice that is the greatest
     struct ref_planes planes = {.keys = &key, .normal = normal, .surfels = words};
     struct ref_resolve out = ref_resolve(&args, &planes, 0, 0);

@@ -13,7 +13,7 @@ static void check(struct harness *h, enum picture_kind kind, const uint32_t crop
     const uint32_t count = (uint32_t)picture.count;
     const size_t inside = (size_t)crop[2] * crop[3];
     struct reveal_args args = {.view = picture.view,
-                               .instance = {.id_base = picture.id_base + count / 8, .id_count = count / 2},
+                               .instance = {.id_base = picture.id_base, .id_first = count / 8, .id_count = count / 2},
                                .crop_x = crop[0],
                                .crop_y = crop[1],
                                .crop_width = crop[2],

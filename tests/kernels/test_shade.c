@@ -26,7 +26,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     s.args.view = s.picture.view;
     s.args.eye_z = perspective ? 0.0f : -3.0f;
     instance->id_base = s.picture.id_base;
-    instance->id_count = (uint32_t)(s.picture.count * 3 / 4);
+    picture_slots(instance, s.picture.count * 3 / 4);
     instance->has_normals = 1;
     instance->color_format = format;
     instance->opacity = 1.0f;
@@ -35,22 +35,22 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     instance->ambient = 0.7f;
     instance->diffuse = 0.9f;
     instance->specular = 0.5f;
-    s.colors_size = (size_t)instance->id_count * 12;
+    s.colors_size = (size_t)instance->slots * 12;
     s.colors = harness_alloc(h, s.colors_size);
-    for (size_t i = 0; i < (size_t)instance->id_count * 3; i++) {
+    for (size_t i = 0; i < (size_t)instance->slots * 3; i++) {
         if (format == 1)
             ((uint8_t *)s.colors)[i] = (uint8_t)rng_next(rng);
         else
             ((float *)s.colors)[i] = (float)rng_range(rng, 0.0, 1.5);
     }
     if (format == 1)
-        s.colors_size = ((size_t)instance->id_count * 3 + 3) / 4 * 4;
+        s.colors_size = ((size_t)instance->slots * 3 + 3) / 4 * 4;
     for (int c = 0; c < 3; c++) {
         instance->color[c] = (float)rng_unit(rng);
         s.lights.world[c] = (float)rng_unit(rng);
     }
     s.shadows = harness_alloc(h, s.picture.count * 8);
-    for (size_t i = 0; i < (size_t)instance->id_count * 2; i++)
+    for (size_t i = 0; i < (size_t)instance->slots * 2; i++)
         s.shadows[i] = rng_below(rng, 255 * 8 + 1) | (uint32_t)rng_next(rng) << PT_SHADOW_SHIFT; // 8 samples
     s.args.arrived = format != 1;
     s.args.light_count = 4;
@@ -92,7 +92,7 @@ static void check(struct harness *h, struct setup *s, double most_open)
     struct pt_buffer *shadows = harness_buffer(h, s->shadows, count * 8);
     struct pt_buffer *shading = harness_buffer(h, s->shading, count * 16);
     struct pt_buffer *color = harness_buffer(h, unset, count * 16), *arrived = harness_buffer(h, unset, count * 4);
-    struct pt_buffer *opacities = harness_buffer(h, s->opacities, s->opacities ? s->args.instance.id_count : 0);
+    struct pt_buffer *opacities = harness_buffer(h, s->opacities, s->opacities ? s->args.instance.slots : 0);
     struct pt_buffer *lights = s->args.instance.lit ? harness_buffer(h, &s->lights, sizeof s->lights) : NULL;
     struct pt_buffer *ramps = s->args.recolor.source ? harness_buffer(h, s->ramps, sizeof s->ramps) : NULL;
     s->args.light_types = 0;
@@ -156,8 +156,8 @@ static void opacities(struct harness *h)
             struct setup s = make(h, &rng, 1, PICTURE_SURFACES, 1);
             s.args.instance.opacity = values[i];
             s.args.instance.has_opacities = own != 0;
-            s.opacities = own ? harness_alloc(h, s.args.instance.id_count) : NULL;
-            for (uint32_t k = 0; k < s.args.instance.id_count && own; k++)
+            s.opacities = own ? harness_alloc(h, s.args.instance.slots) : NULL;
+            for (uint32_t k = 0; k < s.args.instance.slots && own; k++)
                 s.opacities[k] = rng_below(&rng, 3) ? (uint8_t)rng_next(&rng) : rng_below(&rng, 2) ? 255 : 0;
             s.args.blend = i % 2;
             s.args.instance.lit = i < 2;
@@ -350,7 +350,7 @@ static void ramps(struct harness *h)
             recolor->zero = scalar ? -4.0f : source == PT_RAMP_DISTANCE ? 2.0f : 0.3f;
             for (uint32_t k = 0; k < 3 * recolor->entries; k++)
                 s.ramps[3 * recolor->first + k] = (float)rng_unit(&rng);
-            for (uint32_t k = 0; k < s.args.instance.id_count && scalar; k++)
+            for (uint32_t k = 0; k < s.args.instance.slots && scalar; k++)
                 ((float *)s.colors)[k] = k % 50 == 7   ? NAN
                                          : k % 50 == 8 ? INFINITY
                                          : k % 50 == 9 ? -INFINITY

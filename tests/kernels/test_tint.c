@@ -20,7 +20,8 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     picture_invent(&s.picture, rng, 0.7, 5);
     s.args = (struct tint_args){.view = s.picture.view,
                                 .id_base = s.picture.id_base,
-                                .id_count = (uint32_t)(s.picture.count * 3 / 4), // the rest is somebody else's
+                                .id_first = (uint32_t)(s.picture.count / 16),
+                                .id_count = (uint32_t)(s.picture.count * 11 / 16), // the rest is somebody else's
                                 .clip_first = 1,
                                 .clip_count = count,
                                 .eye_z = perspective ? 0.0f : -3.0f};
@@ -59,7 +60,7 @@ static void check(struct harness *h, const struct setup *s)
         int x = (int)(i % picture->view.width), y = (int)(i / picture->view.width);
         struct ref_color expected = ref_tint(&s->args, &planes, s->clips, x, y);
         uint32_t id = ref_key_id(picture->keys[i]) - s->args.id_base;
-        int is_ours = picture->keys[i] != REF_EMPTY_KEY && id < s->args.id_count;
+        int is_ours = picture->keys[i] != REF_EMPTY_KEY && id - s->args.id_first < s->args.id_count;
         ours += (size_t)is_ours;
         changed += memcmp(got + 4 * i, picture->color + 4 * i, 16) != 0;
         if (!is_ours && memcmp(got + 4 * i, picture->color + 4 * i, 16))

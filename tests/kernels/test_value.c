@@ -10,11 +10,12 @@ static void check(struct harness *h, struct rng *rng, const struct picture *pict
 {
     const uint32_t count = (uint32_t)picture->count;
     struct value_args args = {.view = picture->view,
-                              .instance = {.id_base = picture->id_base + count / 8, .id_count = count / 2 + 1},
+                              .instance = {.id_base = picture->id_base, .id_first = count / 8, .id_count = count / 2 + 1},
                               .offset = offset,
                               .first = first};
-    float *scalars = harness_alloc(h, args.instance.id_count * (size_t)4), *unset = harness_alloc(h, count * (size_t)4);
-    for (uint32_t i = 0; i < args.instance.id_count; i++) {
+    const uint32_t slots = args.instance.id_first + args.instance.id_count;
+    float *scalars = harness_alloc(h, slots * (size_t)4), *unset = harness_alloc(h, count * (size_t)4);
+    for (uint32_t i = 0; i < slots; i++) {
         const uint32_t kind = rng_below(rng, 16);
         scalars[i] = kind == 0   ? NAN
                      : kind == 1 ? (rng_below(rng, 2) ? INFINITY : -INFINITY)
@@ -25,7 +26,7 @@ static void check(struct harness *h, struct rng *rng, const struct picture *pict
         unset[i] = -77.0f;
     struct pt_buffer *values = harness_buffer(h, unset, count * (size_t)4);
     HARNESS_RUN(h, value, &args, harness_buffer(h, picture->keys, count * (size_t)8),
-                harness_buffer(h, scalars, args.instance.id_count * (size_t)4), values);
+                harness_buffer(h, scalars, slots * (size_t)4), values);
     const float *got = harness_read(h, values);
     const struct ref_planes planes = picture_planes(picture);
     uint32_t ours = 0;

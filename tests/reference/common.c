@@ -49,7 +49,7 @@ uint64_t ref_key(float z, uint32_t id)
 
 int ref_is_of(const struct instance_args *instance, uint64_t key)
 {
-    return key != REF_EMPTY_KEY && ref_key_id(key) - instance->id_base < instance->id_count;
+    return key != REF_EMPTY_KEY && ref_key_id(key) - instance->id_base - instance->id_first < instance->id_count;
 }
 
 struct ref_range ref_exactly(double value)

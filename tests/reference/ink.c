@@ -41,7 +41,7 @@ struct ref_ink ref_ink(const struct ink_args *args, const struct ref_planes *pla
         return out;
     uint64_t key = planes->keys[nearest[pixel]];
     uint32_t id = ref_key_id(key) - args->instance.id_base;
-    if (id >= args->instance.id_count)
+    if (id - args->instance.id_first >= args->instance.id_count)
         return out;
     double through = args->behind ? 1.0 - out.color[3] : 1.0 - alpha;
     for (int c = 0; args->color_target && c < 4; c++) {

@@ -91,7 +91,7 @@ int ref_closed(const struct reopen_args *args, const struct ref_planes *planes, 
 {
     const size_t width = args->view.width, at = (size_t)y * width + (size_t)x;
     const uint32_t id = ref_key_id(planes->keys[at]), from = planes->from[at] & ~PT_FROM_MIXED;
-    if (isinf(ref_key_z(planes->keys[at])) || id - args->id_base >= args->id_count)
+    if (isinf(ref_key_z(planes->keys[at])) || id - args->id_base - args->id_first >= args->id_count)
         return 0;
     if (from == at)
         return args->discs && planes->away[at] > 4.0f;

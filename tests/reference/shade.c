@@ -307,7 +307,7 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
             size_t word = args->of_pixels
                               ? (light->shadow - 1) * (size_t)view->width * view->height +
                                     (planes->from[pixel] & ~PT_FROM_MIXED)
-                              : (light->shadow - 1) * (size_t)instance->id_count + (ref_key_id(key) - instance->id_base);
+                              : (light->shadow - 1) * (size_t)instance->slots + (ref_key_id(key) - instance->id_base);
             share -= (planes->shadows[word] & PT_SHADOW_SUM) * (double)args->scales[light->shadow - 1];
             arrived += share;
             casting++;

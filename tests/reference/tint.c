@@ -67,7 +67,7 @@ struct ref_color ref_tint(const struct tint_args *args, const struct ref_planes 
     const size_t pixel = (size_t)y * view->width + (size_t)x;
     const float *color = planes->color + 4 * pixel;
     struct ref_color out = {{color[0], color[1], color[2], color[3]}, {0}, 0, 0};
-    const struct instance_args instance = {.id_base = args->id_base, .id_count = args->id_count};
+    const struct instance_args instance = {.id_base = args->id_base, .id_first = args->id_first, .id_count = args->id_count};
     if (!ref_is_of(&instance, planes->keys[pixel]))
         return out;
     double z = ref_key_z(planes->keys[pixel]), footprint = ref_footprint(view, z);

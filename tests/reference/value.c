@@ -9,7 +9,7 @@ struct ref_value ref_value(const struct value_args *args, const struct ref_plane
 {
     const uint64_t key = planes->keys[(size_t)y * args->view.width + (size_t)x];
     const uint32_t id = ref_key_id(key) - args->instance.id_base;
-    const int ours = key != REF_EMPTY_KEY && id < args->instance.id_count;
+    const int ours = key != REF_EMPTY_KEY && id - args->instance.id_first < args->instance.id_count;
     struct ref_value out = {.written = ours || args->first};
     if (!ours || !isfinite(scalars[id]))
         return out;

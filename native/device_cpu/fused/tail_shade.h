@@ -7,7 +7,7 @@
 
 // Colours and shadows of points are fetched at random. Of large clouds each is a miss of all caches: those of a row that is
 // shaded later are asked for (10M points: 4.4 ms in place of 6.3). Of others, so many bytes, none is far (1M: 2% slower).
-static int lies_far(const struct instance_args *instance, size_t size) { return size * instance->id_count > 6u << 20; }
+static int lies_far(const struct instance_args *instance, size_t size) { return size * instance->slots > 6u << 20; }
 
 static void ask_for_colors(const struct tail *tail, const struct pt_seen_row *seen, int32_t y)
 {
@@ -30,7 +30,7 @@ static void ask_for_colors(const struct tail *tail, const struct pt_seen_row *se
                 __builtin_prefetch(colors + size * points[k], 0, 1); // into the second level
             for (uint32_t l = 0; l < casting; l++)
                 for (uint32_t k = 0; k < PT_LANES; k++)
-                    __builtin_prefetch(words + (size_t)l * args->instance.id_count + points[k], 0, 1);
+                    __builtin_prefetch(words + (size_t)l * args->instance.slots + points[k], 0, 1);
         }
     }
 }

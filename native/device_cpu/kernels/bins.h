@@ -354,7 +354,7 @@ typedef void pt_bin_work(void *context, uint32_t instance, const struct pt_discs
 // The instance that an id belongs to.
 static inline uint32_t pt_bin_instance(const struct pt_bins *bins, uint32_t id, uint32_t instance)
 {
-    while (id - bins->discs[instance].instance.id_base >= bins->discs[instance].instance.id_count)
+    while (!pt_is_of(&bins->discs[instance].instance, id - bins->discs[instance].instance.id_base))
         instance = instance + 1 < bins->instances ? instance + 1 : 0;
     return instance;
 }
@@ -394,7 +394,8 @@ pt_bin_some(const struct pt_bins *bins, const struct pt_bin_block *block, uint32
     discs.y = place[1];
     discs.z = place[2];
     discs.id = vi_sub(vf_bits(place[3]), vi_set(args->instance.id_base));
-    const uint32_t others = vm_bits(vm_and(vm_first(count), vm_not(vi_lt_unsigned(discs.id, vi_set(args->instance.id_count)))));
+    const uint32_t others = vm_bits(
+        vm_and(vm_first(count), vm_not(pt_has_ids(discs.id, args->instance.id_first, args->instance.id_count))));
     const uint32_t taken = others ? (uint32_t)__builtin_ctz(others) : count;
     discs.drawn = vm_first(taken);
     pt_disc_size(args, radii, discs.id, word, discs.drawn, &discs);

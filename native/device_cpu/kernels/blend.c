@@ -101,7 +101,7 @@ static inline void set_light_terms(const struct pt_bins *bins, uint32_t instance
         terms[k] = vf_zero();
         if (k >= args->lights || !disc->shadowed)
             continue;
-        const vi word = vi_gather(words + (size_t)(args->first + k) * disc->instance.id_count, discs->id, discs->drawn);
+        const vi word = vi_gather(words + (size_t)(args->first + k) * disc->instance.slots, discs->id, discs->drawn);
         const vf lost = vi_convert(vi_and(word, vi_set(PT_SHADOW_SUM))) * vf_set(args->scales[k]);
         terms[k] = vf_min(lost, vf_set(1.0f)) * opaque;
     }
@@ -284,7 +284,7 @@ static vm of_discs(const struct pt_bins *bins, vi id, vm some, int normals)
     for (uint32_t i = 0; i < bins->instances; i++) {
         const struct instance_args *args = &bins->discs[i].instance;
         if (args->has_normals || !normals)
-            with = vm_or(with, vi_lt_unsigned(vi_sub(id, vi_set(args->id_base)), vi_set(args->id_count)));
+            with = vm_or(with, pt_has_ids(vi_sub(id, vi_set(args->id_base)), args->id_first, args->id_count));
     }
     return vm_and(with, some);
 }

@@ -82,7 +82,7 @@ static void ink_pixels(const struct ink *ink, size_t at, size_t to, vf share, ui
     vi nearest = vi_load(ink->nearest + at),
        id = vi_sub(vi_gather_id(ink->keys, nearest, some), vi_set(args->instance.id_base));
     vf z = vi_float(vi_gather_z(ink->keys, nearest, some));
-    vm ours = vm_and(some, vi_lt_unsigned(id, vi_set(args->instance.id_count)));
+    vm ours = vm_and(some, pt_has_ids(id, args->instance.id_first, args->instance.id_count));
     if (!vm_bits(ours))
         return;
     if (args->color_target)

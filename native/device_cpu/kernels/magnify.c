@@ -526,7 +526,7 @@ static struct before look_before(const struct walk *walk, size_t at, vm lanes)
     const vf z = vi_float(vi_load_z(keys)), marks = vf_load((const float *)PT_DATA(walk->call, magnify, away) + at);
     struct before before;
     before.own = vm_and(vm_and(lanes, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)))),
-                        vi_lt_unsigned(vi_sub(vi_load_id(keys), vi_set(args->id_base)), vi_set(args->id_count)));
+                        pt_has_ids(vi_sub(vi_load_id(keys), vi_set(args->id_base)), args->id_first, args->id_count));
     before.marked = vm_and(before.own, vf_lt(marks, vf_zero()));
     before.z = vf_select(before.own, z, vf_set(1.0f));
     before.step = pt_range_step(walk->cells, args->gamma, args->gamma_cells, before.z);
@@ -577,7 +577,7 @@ static void show(const struct walk *walk, uint32_t x, uint32_t y, uint32_t cy, f
     // 2. before what is there
     vm some = vm_and(best->some, pt_less(z, id, vi_load_z(keys), vi_load_id(keys)));
     if (args->pass & PT_RANGE_FINE) {
-        const vm own = vi_lt_unsigned(vi_sub(vi_load_id(keys), vi_set(args->id_base)), vi_set(args->id_count));
+        const vm own = pt_has_ids(vi_sub(vi_load_id(keys), vi_set(args->id_base)), args->id_first, args->id_count);
         some = vm_and(vm_or(some, own), replaces(walk, at, best, lanes));
     }
     if (args->behind)

@@ -11,7 +11,7 @@ static void mark_row(void *context, uint32_t y)
     uint8_t *marks = PT_DATA(call, mark, marks);
     for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x++) {
         uint32_t id = (uint32_t)keys[x] - args->id_base;
-        if (id < args->id_count && (uint32_t)(keys[x] >> 32) != PT_KEY_EMPTY_Z)
+        if (id - args->id_first < args->id_count && (uint32_t)(keys[x] >> 32) != PT_KEY_EMPTY_Z)
             __atomic_store_n(marks + id, 1, __ATOMIC_RELAXED);
     }
 }

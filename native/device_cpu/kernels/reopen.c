@@ -89,7 +89,7 @@ static inline vm closed(const struct reopen_args *args, const struct planes *pla
 static inline vm is_ours(const struct reopen_args *args, vi z, vi id, vm some)
 {
     const vm shown = vm_and(some, vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z))));
-    return vm_and(shown, vi_lt_unsigned(vi_sub(id, vi_set(args->id_base)), vi_set(args->id_count)));
+    return vm_and(shown, pt_has_ids(vi_sub(id, vi_set(args->id_base)), args->id_first, args->id_count));
 }
 
 static void take(const struct pt_cpu_call *call, const struct planes *planes, uint32_t x, uint32_t y, vi source, vm taken)

@@ -11,7 +11,7 @@ static const uint32_t pt_color_bytes[] = {0, 3, 12, 0, 4, 0}; // of a point, by 
 // Colours of three bytes, gathered as words: byte offsets fit a signed index.
 static inline int pt_gathers_bytes(const struct instance_args *instance)
 {
-    return instance->color_format == 1 && instance->id_count < 1u << 29;
+    return instance->color_format == 1 && instance->slots < 1u << 29;
 }
 
 static inline vi pt_gather_rgb(const void *colors, vi id, vm ours)
@@ -116,7 +116,7 @@ struct pt_lights {
 static inline struct pt_lights pt_lights_of(const struct shade_args *args, const struct light_view *view, const uint32_t *words)
 {
     const size_t pixels = (size_t)args->view.width * args->view.height;
-    struct pt_lights lights = {.view = view, .words = words, .stride = args->of_pixels ? pixels : args->instance.id_count};
+    struct pt_lights lights = {.view = view, .words = words, .stride = args->of_pixels ? pixels : args->instance.slots};
     for (int k = 0; k < 3 && args->instance.lit; k++)
         lights.around[k] = args->instance.ambient * view->world[k];
     return lights;

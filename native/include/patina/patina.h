@@ -68,7 +68,7 @@ extern "C" {
     X(ERROR_UNSUPPORTED, -5, "this build or machine cannot do that")                                                           \
     X(ERROR_DEVICE, -6, "the device failed or was lost")                                                                       \
     X(ERROR_CANCELLED, -7, "cancelled")                                                                                        \
-    X(ERROR_TOO_MANY_POINTS, -8, "more than 2^32 - 2 points in one scene")                                                     \
+    X(ERROR_TOO_MANY_POINTS, -8, "too many points for one cloud or picture")                                                   \
     X(ERROR_EMPTY, -9, "there is nothing to read")                                                                             \
     X(ERROR_INTERNAL, -10, "internal error")
 
@@ -711,7 +711,8 @@ PATINA_API int patina_frame_read(const patina_frame *frame, uint32_t pass, float
 // nothing (0, depth +inf). Like keys they are gone after a render that failed or was cancelled (PATINA_ERROR_EMPTY).
 PATINA_API int patina_frame_read_layer(const patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 // The visibility keys of the first layer, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone
-// after a render that failed or was cancelled, and with a cloud that they show (PATINA_ERROR_EMPTY).
+// after a render that failed or was cancelled, and with a cloud that they show (PATINA_ERROR_EMPTY). Scenes of more than 2^32 - 2 points
+// and triangles have numbers that keys do not hold (PATINA_ERROR_TOO_MANY_POINTS): patina_frame_read_numbers.
 PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
 // ---- shadow textures: kept by the frame while points, casters, lights' places and sizes, samples and resolution stay; lights'
 // power and colour, and lights and clouds that move together, change nothing. `light` counts the lights that cast.

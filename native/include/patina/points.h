@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single points of clouds, a part of patina.h, which includes it: hidden, selected, graded by scan, soft by a field, and picked on the picture. Its
+// Single points of clouds, a part of patina.h, which includes it: hidden, selected, graded by scan, soft by a field, numbered and picked on the picture. Its
 // conventions and thread rules hold here too.
 #ifndef PATINA_POINTS_H
 #define PATINA_POINTS_H
@@ -102,6 +102,13 @@ typedef struct patina_field_info {
 
 // Any thread.
 PATINA_API int patina_field_get_info(const patina_field *field, patina_field_info *info);
+
+// ---- numbers of points in a picture ---------------------------------------------------------------------------------
+
+// What each pixel of the first layer shows, width * height uint64: the number of a point, counted over all instances of clouds in the
+// order in which they were added, or behind those of a triangle, over all meshes; UINT64_MAX: nothing. As the ids of
+// patina_frame_read_keys, and gone when these are, in scenes of any size: keys hold 32 bits.
+PATINA_API int patina_frame_read_numbers(const patina_frame *frame, uint64_t *numbers, size_t size);
 
 // ---- picking: which points lie in an outline on the picture ---------------------------------------------------------
 
