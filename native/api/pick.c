@@ -27,7 +27,8 @@ struct outline {
 
 struct pick {
     const struct patina_scene *scene;
-    const struct pt_instance *instance;
+    const struct pt_instance *instance; // of a cloud in parts the part at hand
+    uint32_t parts;
     const patina_pick *desc;
     struct pt_sieve sieve;
     struct outline outline;
@@ -225,7 +226,7 @@ static int may_have(const struct pick *pick, const struct pt_chunk *chunk, const
     return 1;
 }
 
-static void set_bit(uint8_t *bits, uint32_t index) // from several threads
+static void set_bit(uint8_t *bits, uint64_t index) // from several threads
 {
     __atomic_fetch_or(&bits[index / 8], (uint8_t)(1u << index % 8), __ATOMIC_RELAXED);
 }
@@ -276,7 +277,7 @@ static void pick_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         const enum pt_side side = pt_sieve_chunk(&pick->sieve, &cloud->chunks[c], room, &division);
         if (side != PT_CUT_AWAY)
             pick_chunk(pick, &cloud->chunks[c], side == PT_DIVIDED ? &division : NULL);
-        pt_progress_raise(pick->progress, (double)++pick->done / cloud->chunk_count);
+        pt_progress_raise(pick->progress, (double)++pick->done / pick->instance->whole->chunk_count);
     }
     if (!room)
         pick->done = UINT32_MAX / 2; // never so many chunks: memory lacked
@@ -287,9 +288,11 @@ static void pick_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 static int check(const patina_scene *scene, const patina_pick *desc, const uint8_t *bits, size_t size)
 {
-    if (!bits || desc->instance >= scene->cloud_count)
+    if (!bits || desc->instance >= scene->given)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: bits is NULL, or no such instance");
-    const uint64_t count = scene->instances[desc->instance].cloud->info.count;
+    uint32_t first;
+    pt_scene_parts(scene, desc->instance, &first);
+    const uint64_t count = scene->instances[first].cloud->info.count;
     if (size != (count + 7) / 8)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: %zu bytes for %llu points", size,
                        (unsigned long long)count);
@@ -331,19 +334,20 @@ static int take_keys(struct pick *pick, const struct patina_frame *frame, uint64
 static int run(struct pick *pick, const struct patina_frame *frame, struct pt_inverse_clip *room)
 {
     uint64_t *keys = NULL;
-    const struct patina_cloud *cloud = pick->instance->cloud;
     int error = frame && pick->desc->corners ? take_keys(pick, frame, &keys) : PATINA_OK;
-    struct pt_pool *pool = error ? NULL : pt_pool_create(pt_pool_threads_for(pick->desc->threads, cloud->slots), 0);
+    struct pt_pool *pool = error ? NULL
+                                 : pt_pool_create(pt_pool_threads_for(pick->desc->threads, pick->instance->whole->slots), 0);
     if (!error)
         error = pool ? make_outline(pick->desc, pick->scene->settings.height, &pick->outline) : PATINA_ERROR_MEMORY;
-    if (!error) {
+    for (uint32_t i = 0; i < pick->parts && !error; i++, pick->instance++) {
+        const struct patina_cloud *cloud = pick->instance->cloud;
         pick->sieve = pt_sieve_make(pick->scene, pick->instance, PT_EVERY_POINT, room);
         pt_paged_enter(cloud, 0);
         pt_parallel(pool, cloud->chunk_count, 4, pick_chunks, pick);
         pt_paged_leave(cloud);
-        error = pt_progress_cancelled(pick->progress) ? PATINA_ERROR_CANCELLED
-                : pick->done > cloud->chunk_count     ? PATINA_ERROR_MEMORY
-                                                      : PATINA_OK;
+        error = pt_progress_cancelled(pick->progress)             ? PATINA_ERROR_CANCELLED
+                : pick->done > pick->instance->whole->chunk_count ? PATINA_ERROR_MEMORY
+                                                                  : PATINA_OK;
     }
     free(pick->outline.first);
     free(pick->outline.edges);
@@ -364,8 +368,10 @@ int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, cons
     error = error ? error : check(scene, desc, bits, size);
     if (error)
         return error;
-    struct pick pick = {
-        .scene = scene, .instance = &scene->instances[desc->instance], .desc = desc, .bits = bits, .progress = progress};
+    struct pick pick = {.scene = scene, .desc = desc, .bits = bits, .progress = progress};
+    uint32_t first;
+    pick.parts = pt_scene_parts(scene, desc->instance, &first);
+    pick.instance = &scene->instances[first];
     for (int k = 0; k < 8; k++)
         pick.by_class |= desc->classes[k] != 0;
     memset(bits, 0, size);

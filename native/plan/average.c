@@ -23,6 +23,10 @@ void pt_plan_average(struct pt_builder *builder)
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!pt_averages(builder, instance))
             continue;
+        if (instance->instance->whole->part_count) // each part would take means of its own points alone
+            builder->failed = pt_fail(&builder->scene->handle, PATINA_ERROR_UNSUPPORTED,
+                                      "settings.average: not of a cloud of %llu points; up to 2147483647 can have means",
+                                      (unsigned long long)instance->instance->whole->info.count);
         const struct average_args args = {.view = pt_view_filled(plan, instance),
                                           .instance = instance->args,
                                           .normals = (uint32_t)wants_normals(builder, instance),

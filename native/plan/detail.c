@@ -17,7 +17,7 @@ static void take_gaps(struct pt_detail *detail, double finest, double coarsest)
 void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance,
                      struct pt_detail *detail)
 {
-    const struct patina_cloud *cloud = instance->cloud;
+    const struct patina_cloud *cloud = instance->whole; // levels are those of all its parts
     *detail = (struct pt_detail){0};
     // Cells of range images, discs alone and maps of lights know no coarser points: a map's holes would be light.
     if (!(scene->settings.detail > 0.0f) || plan->map || scene->settings.surface == PATINA_SURFACE_SPLATS ||

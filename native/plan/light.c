@@ -115,13 +115,15 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
 {
     uint32_t count = 0, casters = 0;
     for (uint32_t i = 0; i < scene->cloud_count; i++)
-        casters += (uint32_t)opaque(&scene->instances[i]);
+        casters += pt_is_first_part(scene, i) && opaque(&scene->instances[i]);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         casters += (uint32_t)pt_mesh_casts(pt_mesh_at(scene, i));
     if (casters)
         groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, PT_NO_INSTANCE, 255, 0, 0};
     for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
+        if (!pt_is_first_part(scene, i))
+            continue;
         if (opaque(instance) && spares_itself(instance) && pt_receives(instance) && casters > 1)
             groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, i, 255, 0, 0};
         if (casts_solid(instance) && loss_of(instance) && !opaque(instance))
@@ -135,8 +137,8 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
 int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t i)
 {
     if (group->only != PT_NO_INSTANCE)
-        return i == group->only;
-    return opaque(&scene->instances[i]) && i != group->without;
+        return pt_same_cloud(scene, i, group->only);
+    return opaque(&scene->instances[i]) && (group->without == PT_NO_INSTANCE || !pt_same_cloud(scene, i, group->without));
 }
 
 int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t i)
@@ -145,9 +147,9 @@ int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_g
     if (!pt_receives(instance))
         return 0;
     if (group->only != PT_NO_INSTANCE)
-        return i != group->only || !spares_itself(instance);
+        return !pt_same_cloud(scene, i, group->only) || !spares_itself(instance);
     if (group->without != PT_NO_INSTANCE)
-        return i == group->without;
+        return pt_same_cloud(scene, i, group->without);
     return !(spares_itself(instance) && opaque(instance));
 }
 

@@ -299,7 +299,7 @@ struct pt_plan_meshes {
 // The maps of one sample: those of all opaque casters; of all but one that must not shadow itself, for that one; and of
 // every transparent caster by itself, layer behind layer where its points have opacities of their own.
 struct pt_shadow_group {
-    uint32_t only, without; // instances, or PT_NO_INSTANCE
+    uint32_t only, without; // clouds, by the first instance of each, or PT_NO_INSTANCE
     uint32_t loss;          // 1..255
     int faint;              // its points have opacities of their own
     int soft;               // its soft points: no surface, but what they let through up to any depth

@@ -414,6 +414,10 @@ static int place_range(const struct patina_scene *scene, struct pt_plan *plan, c
     const struct pt_instance *instance = &scene->instances[i];
     const struct cells *cells = &survey->cells[i];
     struct pt_range *range = pt_arena_take(&plan->arena, cells->count * sizeof *range);
+    if (instance->whole->part_count) // each part would have cells of its own
+        return pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED,
+                       "range images: not of a cloud of %llu points; of up to 2147483647 they can be drawn",
+                       (unsigned long long)instance->whole->info.count);
     if (!range)
         return PATINA_ERROR_MEMORY;
     pt_range_place(scene, plan, instance, &survey->camera, survey->objects[i].scale, cells->pixels, cells->count,
@@ -431,7 +435,7 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     uint32_t wide = 0;
     plan->chunks += cloud->chunk_count;
     plan->chunks_culled += cloud->chunk_count;
-    plan->points += cloud->info.count;
+    plan->points += pt_is_first_part(scene, i) ? cloud->info.count : 0;
     if (survey->cells[i].count)
         return place_range(scene, plan, survey, i);
     int error = place_chunks(scene, plan, survey, i, all ? PT_AS_DISCS : PT_AS_POINTS, 0, NULL, &plan->instances[i]);
@@ -490,6 +494,19 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
     plan->mesh.triangles += mesh->info.triangle_count;
 }
 
+// Points of a cloud's parts lie as far apart as of the part whose points lie closest: as of the whole.
+static void join_parts(const struct patina_scene *scene, struct survey *survey)
+{
+    for (uint32_t i = 0, end; i < scene->cloud_count; i = end) {
+        double least = INFINITY;
+        for (end = i; end < scene->cloud_count && pt_same_cloud(scene, i, end); end++)
+            if (survey->seen_count[end] && survey->thinned[end] < least)
+                least = survey->thinned[end];
+        for (uint32_t k = i; k < end && end - i > 1 && least < INFINITY; k++)
+            survey->thinned[k] = least;
+    }
+}
+
 // What the whole picture sees decides spacing, levels, guard: a region must decide alike. 160 covers any guard.
 static int look_around(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
 {
@@ -509,6 +526,7 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     for (uint32_t i = 0; i < scene->mesh_count && !plan->map; i++)
         plan->transparent |= pt_mesh_at(scene, i)->mesh_style.alpha == PATINA_ALPHA_BLEND &&
                              pt_mesh_drawn(pt_mesh_at(scene, i)->mesh);
+    join_parts(scene, survey);
     survey->camera = bare;
     struct pt_spread spread = {.middle = plan->spacing_middle, .most = plan->spacing_px};
     if (!error)

@@ -122,33 +122,47 @@ int pt_frame_read_ids(const struct patina_frame *frame, const struct patina_scen
     return read_plane(frame, "patina_frame_read_keys", keys, size);
 }
 
-int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size)
+// What arrives at the points of an instance, which of a cloud in parts is one of them.
+static int read_part(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values)
 {
     const struct pt_shadows *shadows = &frame->shadows;
-    if (instance >= shadows->instance_count || light >= shadows->light_count || !shadows->words[instance].size ||
-        !shadows->lights[light].samples)
-        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: no texture of light %u on instance %u",
-                       light, instance);
-    const struct patina_cloud *cloud = pt_numbering_cloud(&frame->numbering, instance);
-    if (!cloud)
-        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: cloud %u was destroyed since", instance);
-    size_t count = (size_t)cloud->info.count, bytes = shadows->words[instance].size / shadows->light_count;
-    if (size != count * sizeof *values)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_shadows: %zu points; got %zu bytes", count,
-                       size);
+    const struct patina_cloud *cloud = frame->numbering.clouds[instance].cloud;
+    const size_t bytes = shadows->words[instance].size / shadows->light_count;
     uint32_t *words = malloc(bytes + 1);
     if (!words)
         return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read_shadows: out of memory");
-    int error = frame->device->ops->buffer_read(frame->device, &shadows->words[instance], light * bytes, words, bytes);
-    float scale = 1.0f / (255.0f * (float)shadows->lights[light].samples);
-    for (size_t i = 0; i < count && !error; i++)
-        values[i] = 1.0f; // of points that are not drawn
+    const int error = frame->device->ops->buffer_read(frame->device, &shadows->words[instance], light * bytes, words, bytes);
+    const float scale = 1.0f / (255.0f * (float)shadows->lights[light].samples);
     for (uint32_t c = 0; c < cloud->chunk_count && !error; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t slot = chunk->first; slot < chunk->first + chunk->count; slot++)
             values[pt_number_of(cloud, slot)] = 1.0f - (float)(words[slot] & PT_SHADOW_SUM) * scale;
     }
     free(words);
+    return error;
+}
+
+int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t number, uint32_t light, float *values, size_t size)
+{
+    const struct pt_shadows *shadows = &frame->shadows;
+    uint32_t first;
+    const uint32_t parts = pt_numbering_parts(&frame->numbering, number, &first);
+    if (!parts || first + parts > shadows->instance_count || light >= shadows->light_count || !shadows->words[first].size ||
+        !shadows->lights[light].samples)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: no texture of light %u on instance %u",
+                       light, number);
+    const struct patina_cloud *cloud = pt_numbering_cloud(&frame->numbering, first);
+    if (!cloud)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: cloud %u was destroyed since", number);
+    const size_t count = (size_t)cloud->info.count;
+    if (size != count * sizeof *values)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_shadows: %zu points; got %zu bytes", count,
+                       size);
+    for (size_t i = 0; i < count; i++)
+        values[i] = 1.0f; // of points that are not drawn
+    int error = PATINA_OK;
+    for (uint32_t i = first; i < first + parts && !error; i++)
+        error = read_part(frame, i, light, values);
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 

@@ -18,11 +18,16 @@ int pt_numbering_take(struct pt_numbering *numbering, const struct patina_scene 
         return PATINA_ERROR_MEMORY;
     for (; taken.count < scene->cloud_count; taken.count++) {
         const struct patina_cloud *cloud = scene->instances[taken.count].cloud;
-        taken.clouds[taken.count] = (struct pt_numbered){.cloud = cloud, .alive = cloud->alive, .first_point = taken.points};
+        const int first = pt_is_first_part(scene, taken.count); // the others' numbers are the whole's, too
+        taken.clouds[taken.count] = (struct pt_numbered){.cloud = cloud,
+                                                         .alive = cloud->alive,
+                                                         .number = scene->instances[taken.count].number,
+                                                         .first_point = first ? taken.points
+                                                                              : taken.clouds[taken.count - 1].first_point};
         if (plan)
             taken.clouds[taken.count].window = plan->ids.windows[taken.count];
         atomic_fetch_add(&cloud->alive->references, 1);
-        taken.points += cloud->info.count;
+        taken.points += first ? cloud->info.count : 0;
     }
     taken.triangles = scene->triangles;
     taken.ids = plan ? plan->ids.points : 0;
@@ -38,6 +43,16 @@ int pt_numbering_is_of(const struct pt_numbering *numbering, const struct patina
     for (uint32_t i = 0; same && i < scene->cloud_count; i++)
         same = numbering->clouds[i].alive == scene->instances[i].cloud->alive;
     return same;
+}
+
+uint32_t pt_numbering_parts(const struct pt_numbering *numbering, uint32_t number, uint32_t *first)
+{
+    uint32_t count = 0;
+    for (*first = 0; *first < numbering->count && numbering->clouds[*first].number != number; ++*first)
+        ;
+    while (*first + count < numbering->count && numbering->clouds[*first + count].number == number)
+        count++;
+    return count;
 }
 
 const struct patina_cloud *pt_numbering_cloud(const struct pt_numbering *numbering, uint32_t instance)

@@ -9,6 +9,7 @@
 struct pt_numbered {
     const struct patina_cloud *cloud; // may be gone: see alive
     struct pt_alive *alive;
+    uint32_t number; // that callers have for the cloud, parts of one have the same
     struct pt_window window;
     uint64_t first_point; // where the caller's begin
 };
@@ -26,6 +27,8 @@ int pt_numbering_take(struct pt_numbering *numbering, const struct patina_scene 
 void pt_numbering_release(struct pt_numbering *numbering);
 // Whether it is of the scene's clouds.
 int pt_numbering_is_of(const struct pt_numbering *numbering, const struct patina_scene *scene);
+// The instances that callers have this number for: how many, from *first on.
+uint32_t pt_numbering_parts(const struct pt_numbering *numbering, uint32_t number, uint32_t *first);
 // The cloud of an instance, or NULL when it was destroyed since.
 const struct patina_cloud *pt_numbering_cloud(const struct pt_numbering *numbering, uint32_t instance);
 // The instance and slot of an id, of a disc's too; 0: it is none of a point. *instance: where to look first; any that there is.

@@ -4,6 +4,7 @@
 
 #include "clip.h"
 #include "mask.h"
+#include "parts.h"
 #include "scans.h"
 #include "shared/balls.h"
 #include "shared/lines.h"
@@ -65,17 +66,18 @@ int patina_scene_clear(patina_scene *scene)
         return fail(NULL, "patina_scene_clear: scene is NULL");
     for (uint32_t i = 0; i < scene->cloud_count; i++)
         free((void *)scene->instances[i].style.ramp);
-    scene->cloud_count = scene->light_count = scene->mesh_count = scene->clip_count = 0;
+    scene->cloud_count = scene->given = scene->light_count = scene->mesh_count = scene->clip_count = 0;
     scene->triangles = 0;
     return PATINA_OK;
 }
 
-// Room for one more element, or NULL.
+// Room for so many elements, or NULL.
 static void *grow(void *array, uint32_t count, uint32_t *room, size_t size)
 {
-    if (count < *room)
+    if (count <= *room)
         return array;
     uint32_t wanted = *room ? 2 * *room : 8;
+    wanted = wanted < count ? count : wanted;
     void *grown = realloc(array, wanted * size);
     if (grown)
         *room = wanted;
@@ -210,27 +212,81 @@ static int copy_ramp(patina_cloud_style *style)
     return copy ? PATINA_OK : PATINA_ERROR_MEMORY;
 }
 
+// What is of a cloud's slots is not divided as a cloud in parts is; nor are the sums of what is drawn as range images.
+static int check_parts(const patina_scene *scene, const patina_cloud_style *style, const patina_cloud *cloud)
+{
+    const char *lacks = style->mask                               ? "a mask"
+                        : style->grade                            ? "a grade"
+                        : style->field                            ? "a field"
+                        : style->scans                            ? "scans"
+                        : style->surface == PATINA_SURFACE_RANGES ? "range images"
+                        : cloud->info.has_opacities && !(style->shadow_off & PATINA_SHADOW_NO_CAST)
+                            ? "shadows of points that have opacities of their own"
+                            : NULL;
+    if (!cloud->part_count || !lacks)
+        return PATINA_OK;
+    return pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED,
+                   "cloud style: %s: not of a cloud of %llu points; up to 2147483647 can have them", lacks,
+                   (unsigned long long)cloud->info.count);
+}
+
+// Behind the clouds that are there, which has room.
+static int put_part(patina_scene *scene, const patina_cloud *whole, const patina_cloud *part, const patina_cloud_style *style)
+{
+    struct pt_instance *added = &scene->instances[scene->cloud_count];
+    patina_cloud_style own = *style;
+    if (copy_ramp(&own))
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for the ramp of instance %u", scene->given);
+    memmove(added + 1, added, scene->mesh_count * sizeof *added);
+    *added = (struct pt_instance){
+        .source = PT_SOURCE_CLOUD, .number = scene->given, .cloud = part, .whole = whole, .style = own};
+    scene->cloud_count++;
+    return PATINA_OK;
+}
+
+static void take_last(patina_scene *scene)
+{
+    struct pt_instance *last = &scene->instances[--scene->cloud_count];
+    free((void *)last->style.ramp);
+    memmove(last, last + 1, scene->mesh_count * sizeof *last);
+}
+
 int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style)
 {
     patina_cloud_style checked;
     if (!scene || !cloud || cloud->handle.magic != PT_MAGIC)
         return fail(scene, "patina_scene_add_cloud: scene or cloud is NULL or destroyed");
     int error = pt_take(&scene->handle, "patina_scene_add_cloud", style, &checked, sizeof checked);
-    if (error || (error = check_style(scene, &checked, cloud)))
+    error = error ? error : check_style(scene, &checked, cloud);
+    if (error || (error = check_parts(scene, &checked, cloud)))
         return error;
-    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room,
-                       sizeof *scene->instances);
+    const uint32_t parts = pt_part_count(cloud), before = scene->cloud_count;
+    void *grown = grow(scene->instances, before + parts + scene->mesh_count, &scene->instance_room, sizeof *scene->instances);
     if (!grown)
-        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for instance %u", scene->cloud_count);
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for instance %u", scene->given);
     scene->instances = grown;
-    if (copy_ramp(&checked))
-        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for the ramp of instance %u",
-                       scene->cloud_count);
-    struct pt_instance *added = &scene->instances[scene->cloud_count];
-    memmove(added + 1, added, scene->mesh_count * sizeof *added);
-    *added = (struct pt_instance){.source = PT_SOURCE_CLOUD, .cloud = cloud, .style = checked};
-    scene->cloud_count++;
-    return PATINA_OK;
+    for (uint32_t i = 0; i < parts && !error; i++)
+        error = put_part(scene, cloud, pt_part(cloud, i), &checked);
+    while (error && scene->cloud_count > before)
+        take_last(scene);
+    scene->given += !error;
+    return error;
+}
+
+uint32_t pt_scene_parts(const patina_scene *scene, uint32_t number, uint32_t *first)
+{
+    uint32_t low = 0, high = scene->cloud_count, count = 0;
+    while (low < high) { // numbers rise
+        const uint32_t middle = low + (high - low) / 2;
+        if (scene->instances[middle].number < number)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    while (low + count < scene->cloud_count && scene->instances[low + count].number == number)
+        count++;
+    *first = low;
+    return count;
 }
 
 int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const patina_mesh_style *style)
@@ -264,7 +320,7 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
     error = too_many(scene, mesh->info.triangle_count);
     if (error)
         return error;
-    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count, &scene->instance_room,
+    void *grown = grow(scene->instances, scene->cloud_count + scene->mesh_count + 1, &scene->instance_room,
                        sizeof *scene->instances);
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for mesh %u", scene->mesh_count);
@@ -317,7 +373,7 @@ int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light)
     if (scene->light_count == PT_MAX_LIGHTS)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has %d lights already, the most there can be",
                        PT_MAX_LIGHTS);
-    void *grown = grow(scene->lights, scene->light_count, &scene->light_room, sizeof *scene->lights);
+    void *grown = grow(scene->lights, scene->light_count + 1, &scene->light_room, sizeof *scene->lights);
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for light %u", scene->light_count);
     scene->lights = grown;
@@ -340,7 +396,7 @@ int patina_scene_add_clip(patina_scene *scene, const patina_clip *clip)
     if (!isfinite(checked.tint[0] + checked.tint[1] + checked.tint[2]) || !(checked.tint_width >= 0.0f) ||
         !isfinite(checked.tint_width) || !(checked.tint_strength >= 0.0f && checked.tint_strength <= 1.0f))
         return fail(scene, "clip: tint and tint_width must be finite, the width 0 or more, the strength between 0 and 1");
-    void *grown = grow(scene->clips, scene->clip_count, &scene->clip_room, sizeof *scene->clips);
+    void *grown = grow(scene->clips, scene->clip_count + 1, &scene->clip_room, sizeof *scene->clips);
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for clip %u", scene->clip_count);
     scene->clips = grown;

@@ -14,13 +14,17 @@ enum pt_source { PT_SOURCE_CLOUD, PT_SOURCE_MESH };
 
 struct pt_instance {
     enum pt_source source;
-    uint32_t id_base; // of a mesh's first triangle among triangles
+    union {
+        uint32_t id_base; // of a mesh's first triangle among triangles
+        uint32_t number;  // of a cloud, as callers count them: its parts (parts.h) are instances of one number
+    };
     union {
         const struct patina_cloud *cloud;
         const struct patina_mesh *mesh;
     };
-    union {                       // defaults made explicit
-        patina_cloud_style style; // its ramp is the scene's
+    const struct patina_cloud *whole; // that `cloud` is a part of, or itself
+    union {                           // defaults made explicit
+        patina_cloud_style style;     // its ramp is the scene's
         patina_mesh_style mesh_style;
     };
 };
@@ -28,7 +32,8 @@ struct pt_instance {
 struct patina_scene {
     struct pt_handle handle;
     struct pt_instance *instances; // those of clouds, whose numbers callers know; behind them those of meshes: so do ids
-    uint32_t cloud_count, mesh_count, instance_room;
+    uint32_t cloud_count, mesh_count, instance_room; // parts of clouds counted
+    uint32_t given;                                  // clouds, as callers count them
     patina_light_desc *lights;
     uint32_t light_count, light_room;
     uint64_t triangles; // of all meshes
@@ -51,6 +56,17 @@ static inline struct pt_instance *pt_mesh_at(const struct patina_scene *scene, u
 {
     return &scene->instances[scene->cloud_count + i];
 }
+
+static inline int pt_same_cloud(const struct patina_scene *scene, uint32_t a, uint32_t b)
+{
+    return scene->instances[a].number == scene->instances[b].number;
+}
+static inline int pt_is_first_part(const struct patina_scene *scene, uint32_t i)
+{
+    return !i || !pt_same_cloud(scene, i, i - 1);
+}
+// The instances that a caller's number is of: how many, from *first on; 0: there is no such number.
+uint32_t pt_scene_parts(const struct patina_scene *scene, uint32_t number, uint32_t *first);
 
 static inline uint32_t pt_finer(const struct patina_scene *scene) { return scene->finer > 1 ? scene->finer : 1; }
 
