@@ -9,6 +9,7 @@
 #include "base/platform.h"
 #include "orient.h"
 #include "paged.h"
+#include "parts.h"
 #include "base/progress.h"
 #include "shared/words.h"
 
@@ -450,8 +451,8 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
                         patina_progress *progress, struct pt_analysis *out)
 {
     *out = (struct pt_analysis){0};
-    const int refused = pt_paged_refuse(cloud, "patina_cloud_analyse");
-    if (refused)
+    int refused = pt_paged_refuse(cloud, "patina_cloud_analyse");
+    if (refused || (refused = pt_parts_refuse(cloud, "patina_cloud_analyse")))
         return refused;
     patina_analysis_desc checked = *desc;
     check_arrays(&checked); // checked already

@@ -4,6 +4,7 @@
 #include "base/descriptor.h"
 #include "base/progress.h"
 #include "page_sums.h"
+#include "parts.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -118,7 +119,8 @@ int patina_cloud_analyse_file(const char *from, const patina_analysis_desc *give
     int error = pt_take(NULL, "patina_cloud_analyse_file", given, &desc, sizeof desc);
     if (error || (error = patina_cloud_open(from, &cloud)))
         return error;
-    if ((error = pt_analysis_check(cloud, &desc))) {
+    error = pt_parts_refuse(cloud, "patina_cloud_analyse_file");
+    if (error || (error = pt_analysis_check(cloud, &desc))) {
         patina_cloud_destroy(cloud);
         return error;
     }

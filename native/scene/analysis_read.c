@@ -5,6 +5,7 @@
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "base/progress.h"
+#include "parts.h"
 #include "shared/words.h"
 
 #include <math.h>
@@ -172,7 +173,7 @@ int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbou
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT,
                        "patina_cloud_neighbourhoods: cloud or wanted is NULL");
     int error = pt_take(&cloud->handle, "patina_cloud_neighbourhoods", given, &taken, sizeof taken);
-    if (error)
+    if (error || (error = pt_parts_refuse(cloud, "patina_cloud_neighbourhoods")))
         return error;
     const int walks = wanted->numbers || wanted->distances || wanted->soft_radius || wanted->uncertainty;
     if (walks && (wanted->neighbours < 1 || wanted->neighbours > PT_NEIGHBOURS_MOST))

@@ -6,6 +6,7 @@
 #include "base/platform.h"
 #include "base/progress.h"
 #include "paged.h"
+#include "parts.h"
 #include "shared/discs.h"
 #include "shared/words.h"
 
@@ -409,7 +410,8 @@ static void attribute_chunk(struct build *build, uint32_t index)
     const struct pt_chunk *chunk = &cloud->chunks[index];
     struct tally *tally = &build->tallies[index];
     for (uint32_t i = 0; i < chunk->padded; i++) {
-        const uint32_t slot = chunk->first + i, from = pt_number_of(cloud, slot);
+        const uint32_t slot = chunk->first + i;
+        const uint64_t from = pt_number_of(cloud, slot);
         if (build->desc.opacity.data && cloud->opacities) {
             cloud->opacities[slot] = read_opacity(&build->desc.opacity, from);
             tally->translucent |= cloud->opacities[slot] < 255;
@@ -621,7 +623,9 @@ int pt_cloud_check_desc(patina_cloud_desc *desc)
     if (desc->count && !desc->position.data)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "position: no data for %llu points", (unsigned long long)desc->count);
     if (desc->count > 0x7FFFFFFFull) // gathers take signed indices
-        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "a cloud of %llu points: at most 2147483647 fit, split it",
+        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS,
+                       "%llu points at once: at most 2147483647; a cloud of more is built on the disk, piece by piece "
+                       "(patina_builder_*, or patina convert FILE X.cloud)",
                        (unsigned long long)desc->count);
     if (!finite3(desc->origin))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "origin: not finite");
@@ -689,7 +693,8 @@ int pt_cloud_tell(int error, uint64_t points)
     return !error                            ? PATINA_OK
            : error == PATINA_ERROR_CANCELLED ? pt_fail(NULL, error, "building the cloud was cancelled")
            : error == PATINA_ERROR_TOO_MANY_POINTS
-               ? pt_fail(NULL, error, "a cloud of %llu points: too many, split it", count)
+               ? pt_fail(NULL, error,
+                         "a cloud of %llu points: too many for memory; it can be built on the disk (patina_builder_*)", count)
                : pt_fail(NULL, error, "building a cloud of %llu points: out of memory", count);
 }
 
@@ -711,6 +716,24 @@ int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progres
     return pt_cloud_tell(error, desc.count);
 }
 
+// Into the whole's new array. Returns how many colours are none.
+static uint64_t color_part(struct build *build, const struct patina_cloud *part)
+{
+    struct build own = *build;
+    struct patina_cloud view = *part;
+    uint64_t invalid = 0;
+    own.cloud = &view;
+    view.color_format = build->cloud->color_format;
+    view.colors = build->cloud->colors;
+    if (view.colors)
+        view.colors = (char *)view.colors + view.first_slot * pt_color_size(view.color_format);
+    memset(own.tallies, 0, view.chunk_count * sizeof *own.tallies);
+    pt_parallel(own.pool, view.chunk_count, 1, attribute_chunks, &own);
+    for (uint32_t c = 0; c < view.chunk_count; c++)
+        invalid += own.tallies[c].invalid_colors;
+    return invalid;
+}
+
 // Puts new colours in the place of the old ones; these go only when nothing can fail any more.
 static int replace_colors(struct build *build)
 {
@@ -728,13 +751,13 @@ static int replace_colors(struct build *build)
         cloud->colors = old;
         return PATINA_ERROR_MEMORY;
     }
-    pt_parallel(build->pool, cloud->chunk_count, 1, attribute_chunks, build);
     cloud->info.invalid_colors = 0;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
-        cloud->info.invalid_colors += build->tallies[c].invalid_colors;
+    for (uint32_t i = 0; i < pt_part_count(cloud); i++)
+        cloud->info.invalid_colors += color_part(build, pt_part(cloud, i));
     cloud->info.bytes += (cloud->colors ? color_bytes(cloud) : 0) - (old ? old_bytes : 0);
     cloud->info.has_colors = cloud->color_format != PT_COLOR_NONE;
     cloud->mapped &= ~(1u << PT_ARRAY_COLORS);
+    pt_parts_follow(cloud);
     atomic_fetch_add(&cloud->alive->colors, 1);
     pt_pages_free(old, old_bytes);
     return PATINA_OK;

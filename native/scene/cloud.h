@@ -21,9 +21,9 @@ struct pt_chunk {
     float box_min[3], box_max[3];    // relative to origin
     float cone_axis[3], cone_cosine; // every normal n: n . axis >= cosine; cosine -2: a point has no normal
     float spacing;                   // about 1 / sqrt(points per area), object units; 0 unknown
-    uint32_t first;                  // slot of the first point
-    uint32_t count, padded;          // padded slots repeat the last point
-    uint32_t classes[8];             // of its points: bits as in patina_cloud_info.class_bits
+    uint32_t first;         // slot of the first point; of a cloud in parts (parts.h) that of the part's, see pt_chunk_slot
+    uint32_t count, padded; // padded slots repeat the last point
+    uint32_t classes[8];    // of its points: bits as in patina_cloud_info.class_bits
     uint32_t shapes[8];     // of its points, drawn or not: bit c % 32 of word c / 32: the byte c from PT_SHAPE_SIGHT_SHIFT on
     float reach, footprint; // greatest half axis of its points' footprints, and their 90th percentile; 0: not analysed
     float built;            // the spacing as the cloud was built with it, whatever an analysis found: range images go by it
@@ -105,6 +105,8 @@ struct patina_cloud {
 
 // ---- where points are (positions.c) ----------------------------------------------------------------------------------------
 
+// The slot of a chunk's first point, of a cloud in parts too; the chunk is one of the cloud's own table.
+uint64_t pt_chunk_slot(const struct patina_cloud *cloud, const struct pt_chunk *chunk);
 // Of packed positions: the least power of two whose steps reach over the chunk's box. It is that of the box of what was packed by it,
 // too: rounding moves no coordinate from above half the reach to below it.
 float pt_chunk_step(const struct pt_chunk *chunk);
@@ -120,16 +122,16 @@ void pt_point_place(const struct patina_cloud *cloud, const struct pt_chunk *chu
 // Packs the chunk's points, x, y, z [padded], into 2 * padded words, and rounds its box likewise. Returns how far one is moved at most.
 double pt_chunk_pack(struct pt_chunk *chunk, const float *positions, uint32_t *words);
 
-// How many points lie before that in a slot, where the cloud is unordered; padding is what it repeats.
-uint32_t pt_place_of(const struct patina_cloud *cloud, uint64_t slot);
+// How many points lie before that in a slot, where the cloud is unordered, of a part's those of the whole; padding is what it repeats.
+uint64_t pt_place_of(const struct patina_cloud *cloud, uint64_t slot);
 int pt_cloud_count_places(struct patina_cloud *cloud);  // makes `begins`. 0 or PATINA_ERROR_MEMORY
 int pt_is_as_it_lies(const struct patina_cloud *cloud); // whether its order says nothing else
 
-// The caller's number of the point in a slot. That of a damaged file, whose points nobody looked through, leads beyond no array.
-static inline uint32_t pt_number_of(const struct patina_cloud *cloud, uint64_t slot)
+// The caller's number of the point in a slot, of a part's too: info.count is the whole's there. That of a damaged file, whose points nobody
+// looked through, leads beyond no array.
+static inline uint64_t pt_number_of(const struct patina_cloud *cloud, uint64_t slot)
 {
-    const uint32_t number = cloud->order ? cloud->order[slot] : pt_place_of(cloud, slot),
-                   last = (uint32_t)cloud->info.count - 1;
+    const uint64_t number = cloud->order ? cloud->order[slot] : pt_place_of(cloud, slot), last = cloud->info.count - 1;
     return number < last ? number : last;
 }
 

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A built cloud as a file (DESIGN rule 5): its arrays as they lie in memory, each from a multiple of SECTION bytes on, so
 // that opening it maps them and reads nothing but chunks and their order. A cache for this machine's kind: another byte order,
-// version or struct is another file, and the caller builds it anew.
+// version or struct is another file, and the caller builds it anew. Of a chunk in a file `first` is its slot in the whole modulo 2^32: what
+// has more slots is a cloud in parts (parts.h), and says so nowhere.
 #include "analysis.h"
 #include "cloud.h"
 #include "fingerprint.h"
 #include "clusters.h"
 #include "page_sums.h"
 #include "paged.h"
+#include "parts.h"
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "base/progress.h"
@@ -267,7 +269,7 @@ static void add_packed(struct pt_cloud_writer *writer, const struct patina_cloud
 {
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         struct pt_chunk *chunk = &out->chunks[c];
-        const float *positions = (const float *)cloud->positions + 3 * (size_t)chunk->first;
+        const float *positions = (const float *)cloud->positions + 3 * pt_chunk_slot(cloud, &cloud->chunks[c]);
         const double moved = pt_chunk_pack(chunk, positions, words);
         out->info.packed_error = moved > out->info.packed_error ? moved : out->info.packed_error;
         pt_cloud_writer_add(writer, PT_ARRAY_POSITIONS, words, (uint64_t)chunk->padded * 4 * PT_PACKED_WORDS);
@@ -281,7 +283,7 @@ static void add_packed(struct pt_cloud_writer *writer, const struct patina_cloud
     }
 }
 
-// out: what is written: the cloud, or of it what is said otherwise, with chunks of its own where it is packed now.
+// out: what is written: the cloud, or of it what is said otherwise, with chunks of its own where it is packed now or in parts.
 static int save(const patina_cloud *cloud, const char *path, struct patina_cloud *out)
 {
     const int packs = out->packed && !cloud->packed;
@@ -310,7 +312,7 @@ static int save(const patina_cloud *cloud, const char *path, struct patina_cloud
     return pt_cloud_writer_end(writer, out);
 }
 
-static int save_packed(const patina_cloud *cloud, const char *path, struct patina_cloud *out)
+static int save_chunks(const patina_cloud *cloud, const char *path, struct patina_cloud *out)
 {
     const size_t size = cloud->chunk_count * sizeof *cloud->chunks;
     struct pt_chunk *chunks = malloc(size + 1);
@@ -318,11 +320,13 @@ static int save_packed(const patina_cloud *cloud, const char *path, struct patin
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
     if (size)
         memcpy(chunks, cloud->chunks, size);
+    uint64_t slot = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count; slot += chunks[c++].padded)
+        chunks[c].first = (uint32_t)slot; // in the whole
     out->chunks = chunks;
-    out->packed = 1;
     const int error = save(cloud, path, out);
     free(chunks);
-    if (!error)
+    if (!error && out->packed && !cloud->packed)
         pt_log(PT_LOG_INFO, "%s: packing moved positions by %.3g at most", path, out->info.packed_error);
     return error;
 }
@@ -334,7 +338,8 @@ static int save_as(const patina_cloud *cloud, const char *path, const patina_sav
         out.unordered = 1;
     if (desc->drop_order)
         out.info.count = out.info.drawn;
-    return desc->pack && !cloud->packed ? save_packed(cloud, path, &out) : save(cloud, path, &out);
+    out.packed = desc->pack || cloud->packed;
+    return out.packed != cloud->packed || cloud->part_count ? save_chunks(cloud, path, &out) : save(cloud, path, &out);
 }
 
 int patina_cloud_save_as(const patina_cloud *cloud, const char *path, const patina_save_desc *given)
@@ -373,7 +378,7 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
                      (double)chunk->gap;
         for (int k = 0; k < 3; k++)
             sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] + (double)chunk->cone_axis[k];
-        if (chunk->first != next || !chunk->count || chunk->count > chunk->padded || chunk->padded % PT_CHUNK_ALIGN ||
+        if (chunk->first != (uint32_t)next || !chunk->count || chunk->count > chunk->padded || chunk->padded % PT_CHUNK_ALIGN ||
             chunk->padded > PT_CHUNK_POINTS || chunk->padded > cloud->slots - next || !isfinite(sum) ||
             !isfinite(chunk->cone_cosine))
             return refuse(path, "a chunk is damaged");
@@ -395,9 +400,11 @@ static int check_version(const char *path, const struct header *header, const pa
     return header->size == size ? PATINA_OK : refuse(path, "a saved cloud that was cut short");
 }
 
+enum { COUNT_BITS = 48 }; // of points: sizes in bytes are far from 2^64 then
+
 static int check_header(const char *path, const struct header *header, const patina_cloud_info *info)
 {
-    if (header->color_format > PT_COLOR_FLOAT || info->count > 0x7FFFFFFF || info->chunks != header->chunk_count ||
+    if (header->color_format > PT_COLOR_FLOAT || info->count >> COUNT_BITS || info->chunks != header->chunk_count ||
         header->slots > 2 * info->count + 16ull * header->chunk_count || header->chunk_count > info->count ||
         info->drawn > info->count || info->has_colors != (header->color_format != PT_COLOR_NONE) || info->has_opacities > 1 ||
         info->has_normals > 1 || info->has_radii > 1 || !isfinite(info->radius_most) ||
@@ -498,11 +505,14 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
         cloud->mapped |= (uint32_t)(sections[i].size > 0) << i;
     cloud->beside = header.beside != 0;
     code = check_cloud(path, cloud);
-    if (!code && cloud->unordered && pt_cloud_count_places(cloud))
-        code = pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
-    if (!code)
-        pt_clusters_make(cloud);
-    return code ? code : read_pages(path, disk, &header, pages_at(sections), cloud);
+    code = code ? code : read_pages(path, disk, &header, pages_at(sections), cloud);
+    if (code)
+        return code;
+    pt_clusters_make(cloud);
+    error = pt_parts_make(cloud, pt_part_slots());
+    if (!error && cloud->unordered && !cloud->part_count)
+        error = pt_cloud_count_places(cloud);
+    return error ? pt_fail(NULL, error, "%s: out of memory", path) : PATINA_OK;
 }
 
 // ---- verify ------------------------------------------------------------------------------------------------------------

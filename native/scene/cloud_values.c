@@ -4,6 +4,7 @@
 #include "cloud.h"
 #include "fingerprint.h"
 #include "paged.h"
+#include "parts.h"
 #include "io/file.h"
 #include "base/compare.h"
 #include "base/platform.h"
@@ -94,6 +95,7 @@ static int take_scalars(struct patina_cloud *cloud, const patina_array *scalar)
     pt_pages_free(cloud->scalars, size);
     cloud->scalars = values;
     cloud->info.has_scalars = scalar->data != NULL;
+    pt_parts_follow(cloud);
     return PATINA_OK;
 }
 

@@ -9,6 +9,7 @@
 #include "base/platform.h"
 #include "base/pool.h"
 #include "fingerprint.h"
+#include "parts.h"
 #include "base/elementary.h"
 
 #include <float.h>
@@ -258,7 +259,7 @@ int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: cloud or out is NULL, or the cloud destroyed");
     *out = NULL;
     int error = pt_take(NULL, "patina_field_create", desc, &checked, sizeof checked);
-    if (error || (error = check(cloud, &checked)))
+    if (error || (error = pt_parts_refuse(cloud, "patina_field_create")) || (error = check(cloud, &checked)))
         return error;
     struct fill fill = {.cloud = cloud,
                         .desc = &checked,

@@ -6,6 +6,7 @@
 #include "base/color.h"
 #include "base/platform.h"
 #include "base/elementary.h"
+#include "parts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -115,6 +116,9 @@ static int check(const patina_cloud *cloud, const patina_scan_grade *grades, con
     if (!cloud || cloud->handle.magic != PT_MAGIC || !grades || !count || count > MOST_SCANS)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: a cloud that was destroyed, or not 1 to %d scans",
                        MOST_SCANS);
+    const int refused = pt_parts_refuse(cloud, "patina_grade_create");
+    if (refused)
+        return refused;
     if (!cloud->colors)
         return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "patina_grade_create: the cloud has no colours");
     for (uint32_t i = 0; i < count; i++) {

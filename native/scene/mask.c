@@ -3,6 +3,7 @@
 #include "mask.h"
 
 #include "base/platform.h"
+#include "parts.h"
 
 #include <stdlib.h>
 
@@ -28,7 +29,7 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         const struct pt_chunk *chunk = &fill->cloud->chunks[c];
         uint32_t *words = fill->mask->words + chunk->first / PT_SLOTS_A_WORD, hidden = 0;
         for (uint32_t i = 0; i < chunk->padded; i++) {
-            const uint32_t number = pt_number_of(fill->cloud, (uint64_t)chunk->first + i);
+            const uint32_t number = (uint32_t)pt_number_of(fill->cloud, (uint64_t)chunk->first + i);
             const uint32_t hides = bit_of(fill->hidden, number), selects = bit_of(fill->selected, number);
             words[i / PT_SLOTS_A_WORD] |= (hides | selects << PT_SLOTS_A_WORD) << i % PT_SLOTS_A_WORD;
             hidden += i < chunk->count && hides;
@@ -53,6 +54,9 @@ int patina_mask_create(const patina_cloud *cloud, const uint8_t *hidden, const u
     if (!cloud || !out || cloud->handle.magic != PT_MAGIC)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_mask_create: cloud or out is NULL, or the cloud destroyed");
     *out = NULL;
+    const int refused = pt_parts_refuse(cloud, "patina_mask_create");
+    if (refused)
+        return refused;
     if (size != (cloud->info.count + 7) / 8)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_mask_create: %zu bytes for %llu points; it takes %llu", size,
                        (unsigned long long)cloud->info.count, (unsigned long long)((cloud->info.count + 7) / 8));

@@ -93,6 +93,12 @@ uint32_t pt_page_at(const struct patina_cloud *cloud, uint32_t first)
     return low;
 }
 
+// A part has the sums of the whole, whose pages they count.
+static atomic_uint *state_of(const struct patina_cloud *cloud, uint32_t chunk)
+{
+    return &cloud->page_sums->states[(size_t)cloud->first_chunk + chunk];
+}
+
 int pt_pages_are_damaged(const struct patina_cloud *cloud)
 {
     return cloud->page_sums && atomic_load_explicit(&cloud->page_sums->damaged, memory_order_relaxed);
@@ -100,7 +106,7 @@ int pt_pages_are_damaged(const struct patina_cloud *cloud)
 
 int pt_page_is_damaged(const struct patina_cloud *cloud, uint32_t chunk)
 {
-    return cloud->page_sums && atomic_load_explicit(&cloud->page_sums->states[chunk], memory_order_relaxed) & PT_PAGE_DAMAGED;
+    return cloud->page_sums && atomic_load_explicit(state_of(cloud, chunk), memory_order_relaxed) & PT_PAGE_DAMAGED;
 }
 
 uint32_t pt_page_unseen(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays)
@@ -108,7 +114,7 @@ uint32_t pt_page_unseen(const struct patina_cloud *cloud, uint32_t chunk, uint32
     const uint32_t summed = (2u << PT_ARRAY_SHAPES) - (1u << PT_ARRAY_POSITIONS);
     if (!cloud->page_sums)
         return 0;
-    const uint32_t state = atomic_load_explicit(&cloud->page_sums->states[chunk], memory_order_relaxed);
+    const uint32_t state = atomic_load_explicit(state_of(cloud, chunk), memory_order_relaxed);
     return state & PT_PAGE_DAMAGED ? 0 : arrays & cloud->mapped & summed & ~state;
 }
 
@@ -117,11 +123,12 @@ static int is_good(const struct patina_cloud *cloud, uint32_t c, enum pt_array a
     struct patina_cloud copy = *cloud;
     struct pt_section sections[PT_ARRAYS];
     const struct pt_chunk *chunk = &cloud->chunks[c];
+    const uint32_t page = cloud->first_chunk + c;
     const uint64_t each = pt_cloud_array_bytes(cloud, array);
     pt_cloud_sections(&copy, sections);
-    const char *data = (const char *)*sections[array].data + chunk->first * each;
-    const uint64_t sum = pt_fingerprint(seed_of(c, array), data, (size_t)(chunk->padded * each));
-    return fold(sum) == cloud->page_sums->sums[(size_t)c * PT_SUMMED + (size_t)array - 1];
+    const char *data = (const char *)*sections[array].data + pt_chunk_slot(cloud, chunk) * each;
+    const uint64_t sum = pt_fingerprint(seed_of(page, array), data, (size_t)(chunk->padded * each));
+    return fold(sum) == cloud->page_sums->sums[(size_t)page * PT_SUMMED + (size_t)array - 1];
 }
 
 int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays)
@@ -137,7 +144,7 @@ int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arr
         }
     if (!(good | bad))
         return 0;
-    const uint32_t before = atomic_fetch_or(&cloud->page_sums->states[chunk], good | bad);
+    const uint32_t before = atomic_fetch_or(state_of(cloud, chunk), good | bad);
     if (bad && !(before & PT_PAGE_DAMAGED)) {
         atomic_fetch_add(&cloud->page_sums->damaged, 1);
         atomic_fetch_add(&cloud->page_sums->untold, 1);
@@ -150,29 +157,30 @@ int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arr
 void pt_pages_tell(const struct patina_cloud *cloud)
 {
     struct pt_page_sums *sums = cloud->page_sums;
+    const struct pt_chunk *chunks = cloud->chunks - cloud->first_chunk; // of the whole, of which it may be a part
     uint32_t pages = 0, first = 0;
     uint64_t points = 0;
     if (!sums || !atomic_exchange(&sums->untold, 0))
         return;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
-        if (pt_page_is_damaged(cloud, c) && !(atomic_fetch_or(&sums->states[c], PT_PAGE_TOLD) & PT_PAGE_TOLD)) {
+    for (uint32_t c = 0; c < sums->chunk_count; c++)
+        if (sums->states[c] & PT_PAGE_DAMAGED && !(atomic_fetch_or(&sums->states[c], PT_PAGE_TOLD) & PT_PAGE_TOLD)) {
             first = pages++ ? first : c;
-            points += cloud->chunks[c].count;
+            points += chunks[c].count;
         }
     if (!pages)
         return;
-    const struct pt_chunk *at = &cloud->chunks[first];
+    const struct pt_chunk *at = &chunks[first];
     double middle[3];
     for (int k = 0; k < 3; k++)
         middle[k] = at->origin[k] + 0.5 * ((double)at->box_min[k] + (double)at->box_max[k]);
     if (pages == 1)
         pt_log(PT_LOG_WARNING, "%s: page %u of %u is damaged, and its %llu points about (%.10g, %.10g, %.10g) are left out",
-               sums->path, first + 1, cloud->chunk_count, (unsigned long long)points, middle[0], middle[1], middle[2]);
+               sums->path, first + 1, sums->chunk_count, (unsigned long long)points, middle[0], middle[1], middle[2]);
     else
         pt_log(PT_LOG_WARNING,
                "%s: %u of %u pages are damaged, and their %llu points are left out; the first is page %u, about (%.10g, %.10g, "
                "%.10g)",
-               sums->path, pages, cloud->chunk_count, (unsigned long long)points, first + 1, middle[0], middle[1], middle[2]);
+               sums->path, pages, sums->chunk_count, (unsigned long long)points, first + 1, middle[0], middle[1], middle[2]);
 }
 
 int pt_pages_refuse(const struct patina_cloud *cloud, uint64_t held, patina_progress *progress)

@@ -12,6 +12,7 @@ enum { PT_SUMMED = PT_ARRAY_SHAPES };
 // As they lie in a file: of chunk c and array a the sum [c * PT_SUMMED + a - 1]; 0 where there is no such array.
 static inline size_t pt_page_sum_bytes(uint64_t chunks) { return (size_t)chunks * PT_SUMMED * sizeof(uint32_t); }
 
+// Of a whole file; its parts (parts.h) point to the same, so that damage that one finds all know, and pages count in the whole.
 struct pt_page_sums {
     uint32_t *sums;
     atomic_uint *states; // a chunk: bits 1 << array: is as it was written; PT_PAGE_DAMAGED: is not, and is left out
@@ -40,7 +41,7 @@ void pt_page_sums_destroy(struct pt_page_sums *pages); // NULL is fine
 
 // The chunk that begins at a slot.
 uint32_t pt_page_at(const struct patina_cloud *cloud, uint32_t first);
-// Whether some chunk, or this one, was found to be damaged.
+// Whether some chunk, of a part's whole too, or this one, was found to be damaged.
 int pt_pages_are_damaged(const struct patina_cloud *cloud);
 int pt_page_is_damaged(const struct patina_cloud *cloud, uint32_t chunk);
 // Whether these arrays (bits 1 << pt_array) of the chunk need a look yet: those that lie in the file. Any thread.

@@ -23,6 +23,19 @@ static uint32_t fitting(const struct patina_cloud *cloud, uint32_t first, uint64
     return c - first;
 }
 
+// A part's arrays begin in the whole's.
+static void lay_arrays(const struct patina_cloud *whole, struct patina_cloud *part)
+{
+    struct patina_cloud copy = *whole;
+    struct pt_section from[PT_ARRAYS], to[PT_ARRAYS];
+    pt_cloud_sections(&copy, from);
+    pt_cloud_sections(part, to);
+    for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++) {
+        char *data = *from[i].data;
+        *to[i].data = data ? data + part->first_slot * pt_cloud_array_bytes(whole, (enum pt_array)i) : NULL;
+    }
+}
+
 // Part of the whole from a chunk on, whose points before it are known.
 static int make_part(const struct patina_cloud *whole, uint32_t first_chunk, uint32_t chunks, const struct patina_cloud *before,
                      struct patina_cloud *part)
@@ -44,11 +57,7 @@ static int make_part(const struct patina_cloud *whole, uint32_t first_chunk, uin
         part->info.drawn += part->chunks[c].count;
     }
     part->info.chunks = chunks;
-    struct pt_section sections[PT_ARRAYS];
-    pt_cloud_sections(part, sections);
-    for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
-        if (*sections[i].data)
-            *sections[i].data = (char *)*sections[i].data + part->first_slot * pt_cloud_array_bytes(whole, (enum pt_array)i);
+    lay_arrays(whole, part);
     pt_handle_init(&part->handle);
     part->alive = pt_alive_create();
     if (!part->alive || (part->unordered && pt_cloud_count_places(part)))
@@ -83,7 +92,30 @@ int pt_parts_make(struct patina_cloud *cloud, uint64_t most)
     return PATINA_OK;
 }
 
-// Arrays and chunks are the whole's.
+void pt_parts_follow(struct patina_cloud *cloud)
+{
+    for (uint32_t i = 0; i < cloud->part_count; i++) {
+        struct patina_cloud *part = &cloud->parts[i];
+        const uint64_t drawn = part->info.drawn, chunks = part->info.chunks;
+        part->info = cloud->info;
+        part->info.drawn = drawn;
+        part->info.chunks = chunks;
+        part->mapped = cloud->mapped;
+        part->color_format = cloud->color_format;
+        lay_arrays(cloud, part);
+        atomic_fetch_add(&part->alive->colors, 1);
+    }
+}
+
+int pt_parts_refuse(const struct patina_cloud *cloud, const char *call)
+{
+    return cloud->part_count ? pt_fail(&cloud->handle, PATINA_ERROR_TOO_MANY_POINTS,
+                                       "%s: does not take a cloud in parts yet, and %llu points make %u of them", call,
+                                       (unsigned long long)cloud->info.count, cloud->part_count)
+                             : PATINA_OK;
+}
+
+// Arrays, chunks, sums of pages and what stations saw are the whole's.
 void pt_parts_destroy(struct patina_cloud *cloud)
 {
     for (uint32_t i = 0; i < cloud->part_count; i++) {

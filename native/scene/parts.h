@@ -20,5 +20,9 @@ static inline const struct patina_cloud *pt_part(const struct patina_cloud *clou
 // stays as it is. 0 or PATINA_ERROR_MEMORY (then it has no parts).
 int pt_parts_make(struct patina_cloud *cloud, uint64_t most);
 void pt_parts_destroy(struct patina_cloud *cloud);
+// Parts take over what the whole has for arrays of points and says of them, which are others now.
+void pt_parts_follow(struct patina_cloud *cloud);
+// PATINA_ERROR_TOO_MANY_POINTS, with a message that names the call, of a cloud in parts: for calls that take none yet.
+int pt_parts_refuse(const struct patina_cloud *cloud, const char *call);
 
 #endif

@@ -19,9 +19,17 @@ float pt_chunk_step(const struct pt_chunk *chunk)
     return ldexpf(1.0f, most > 0.0f && power > LEAST_STEP ? power : LEAST_STEP);
 }
 
+uint64_t pt_chunk_slot(const struct patina_cloud *cloud, const struct pt_chunk *chunk)
+{
+    uint32_t i = cloud->part_count;
+    while (i > 1 && chunk < cloud->parts[i - 1].chunks)
+        i--;
+    return (i ? cloud->parts[i - 1].first_slot : 0) + chunk->first;
+}
+
 static const uint32_t *words_of(const struct patina_cloud *cloud, const struct pt_chunk *chunk)
 {
-    return (const uint32_t *)cloud->positions + (size_t)pt_position_words(cloud) * chunk->first;
+    return (const uint32_t *)cloud->positions + pt_position_words(cloud) * pt_chunk_slot(cloud, chunk);
 }
 
 const float *pt_chunk_positions(const struct patina_cloud *cloud, const struct pt_chunk *chunk, float *scratch)
@@ -99,8 +107,14 @@ int pt_cloud_count_places(struct patina_cloud *cloud)
     return PATINA_OK;
 }
 
-uint32_t pt_place_of(const struct patina_cloud *cloud, uint64_t slot)
+uint64_t pt_place_of(const struct patina_cloud *cloud, uint64_t slot)
 {
+    if (cloud->part_count) {
+        uint32_t k = cloud->part_count - 1;
+        while (k && slot < cloud->parts[k].first_slot)
+            k--;
+        return pt_place_of(&cloud->parts[k], slot - cloud->parts[k].first_slot);
+    }
     uint32_t low = 0, high = cloud->chunk_count;
     while (high - low > 1) {
         const uint32_t middle = low + (high - low) / 2;
@@ -111,15 +125,15 @@ uint32_t pt_place_of(const struct patina_cloud *cloud, uint64_t slot)
     }
     const struct pt_chunk *chunk = &cloud->chunks[low];
     const uint32_t i = (uint32_t)slot - chunk->first;
-    return cloud->begins[low] + (i < chunk->count ? i : chunk->count - 1);
+    return cloud->first_number + cloud->begins[low] + (i < chunk->count ? i : chunk->count - 1);
 }
 
 int pt_is_as_it_lies(const struct patina_cloud *cloud)
 {
-    uint32_t next = 0;
-    for (uint32_t c = 0; c < cloud->chunk_count && cloud->order; c++)
+    uint64_t next = 0, slot = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count && cloud->order; slot += cloud->chunks[c++].padded)
         for (uint32_t i = 0; i < cloud->chunks[c].count; i++)
-            if (cloud->order[cloud->chunks[c].first + i] != next++)
+            if (cloud->order[slot + i] != next++)
                 return 0;
     return 1;
 }

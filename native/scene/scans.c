@@ -3,6 +3,7 @@
 
 #include "base/platform.h"
 #include "mask.h"
+#include "parts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -77,13 +78,14 @@ static int check(const patina_cloud *cloud, const patina_scan *scans, uint32_t c
     if (!cloud || cloud->handle.magic != PT_MAGIC || !scans || !count || count > MOST_SCANS)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_scans_create: a cloud that was destroyed, or not 1 to %d scans",
                        MOST_SCANS);
-    for (uint32_t i = 0; i < count; i++) {
+    const int refused = pt_parts_refuse(cloud, "patina_scans_create");
+    for (uint32_t i = 0; i < count && !refused; i++) {
         const double *d = scans[i].direction;
         if (!isfinite(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) || !(scans[i].interval >= 0.0) || !isfinite(scans[i].interval))
             return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT,
                            "patina_scans_create: scan %u: its direction is not finite, or its interval not 0 or more", i);
     }
-    return PATINA_OK;
+    return refused;
 }
 
 static void take_scans(struct patina_scans *out, const patina_scan *scans)

@@ -214,7 +214,7 @@ typedef struct patina_cloud_info {
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
 // at rest (position 12, id 4, colour 3, normal and spacing 4, opacity 1; a scalar 4 and a class 1 more), at most 16 more
-// while building.
+// while building. At most 2147483647 points; patina_builder_begin takes more.
 PATINA_API int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out);
 PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
 // Gives a cloud other colours (as in the descriptor, count elements; NULL data: none) and leaves all else as it is, so
@@ -302,6 +302,9 @@ PATINA_API int patina_cloud_neighbourhoods(const patina_cloud *cloud, const pati
 // cloud is open its file may be replaced (patina_cloud_save does), not written into. A cloud of a file with damaged pages is not saved
 // (PATINA_ERROR_FORMAT, which names them): they would pass as good. patina_cloud_save_as makes it smaller.
 PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
+// A file may hold any number of points. One of more than 2147483647 slots (points, and padding of chunks) is drawn, told of, saved, and given
+// colours and scalars like any; patina_cloud_analyse, patina_cloud_neighbourhoods, masks, grades, scans and fields refuse it
+// (PATINA_ERROR_TOO_MANY_POINTS) and change nothing.
 PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
 // Reads a saved cloud whole and compares the sum of each of its sections with that of the writing, which opening leaves out but
 // for the chunks: PATINA_ERROR_FORMAT where any differs. progress: may be NULL; stops it too. Any thread, open clouds or not.
