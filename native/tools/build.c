@@ -189,6 +189,11 @@ static int analyse(struct job *job)
     atomic_store(&teller.done, 1);
     if (told)
         pt_thread_join(&thread);
+    if (code == PATINA_ERROR_TOO_MANY_POINTS) {
+        tool_say("note: %s is not analysed: it has more points than an analysis takes", job->build->out);
+        job->found = job->place;
+        return TOOL_OK;
+    }
     return code ? fail(job, job->build->in, NULL, code) : TOOL_OK;
 }
 
@@ -268,7 +273,8 @@ static int finish_cloud(struct job *job)
     if (result || job->found == job->build->out)
         return result;
     result = save_as(job, job->found);
-    pt_file_remove(job->found);
+    if (job->found != job->place) // which is the input where that is a saved cloud
+        pt_file_remove(job->found);
     return result;
 }
 

@@ -36,7 +36,8 @@ typedef struct patina_builder_desc {
 // processes may build one file at a time: the last to end has it. desc may be NULL. PATINA_ERROR_FILE where the disk lacks room.
 PATINA_API int patina_builder_begin(const char *path, const patina_builder_desc *desc, patina_builder **out);
 // The next points: numbered in the order that they come in. Arrays are copied; which there are, their types and the origin are those of
-// the first piece with any points. threads is ignored. At most 2147483647 points in all.
+// the first piece with any points. threads is ignored. At most 2147483647 points a piece, of any number in all: of more than 4294967295
+// the file has no order, and numbers them as they lie (patina_save_desc.drop_order).
 PATINA_API int patina_builder_add(patina_builder *builder, const patina_cloud_desc *piece);
 // The same of a file's points, or of one of its windows: what patina_file_cloud makes of them, and the attribute `scalar`, in its order;
 // NULL: none.
@@ -51,6 +52,7 @@ PATINA_API void patina_builder_destroy(patina_builder *builder); // without an e
 // does not fit (36 bytes a point; with a grid 16 more and 4 a cell) lies on the disk beside `to`, without a name. Beside what memory
 // says: chunks, 0.1 bytes a point, the descriptor's arrays, and with free space up to 100 MB of what stations saw. PATINA_ERROR_FILE
 // where the disk lacks room. After an error, a cancel or a kill there is no file but the one that was there before.
+// PATINA_ERROR_TOO_MANY_POINTS: of more than 2147483647 slots (points and padding), which makes a cloud of parts.
 PATINA_API int patina_cloud_analyse_file(const char *from, const patina_analysis_desc *desc, uint64_t memory, const char *to,
                                          patina_progress *progress);
 
