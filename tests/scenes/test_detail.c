@@ -22,7 +22,7 @@ static int make_file(void **state)
     (void)state;
     if (close(mkstemp(path)))
         support_die("no temporary file");
-    town_write(path, ACROSS, QUARTER, LEVELS);
+    town_write(path, ACROSS, QUARTER, LEVELS, 0);
     return 0;
 }
 

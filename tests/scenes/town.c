@@ -122,7 +122,7 @@ struct town {
     const patina_cloud *quarter;
     struct patina_cloud whole; // its numbers, and chunks
     struct pt_cloud_writer *writer;
-    uint8_t *colors;
+    uint8_t *colors; // NULL: none, nor footprints
     uint32_t chunks; // so many are done, and slots
     uint64_t slots;
 };
@@ -152,11 +152,13 @@ static void add_points(struct town *town, const struct level *level, const uint3
 {
     const struct patina_cloud *from = town->quarter;
     const uint64_t first = level->slot, slots = level->slot_end - first;
-    for (uint64_t i = 3 * first; i < 3 * level->slot_end; i++) // of 256ths, another tone a quarter
+    for (uint64_t i = 3 * first; i < 3 * level->slot_end && town->colors; i++) // of 256ths, another tone a quarter
         town->colors[i - 3 * first] =
             (uint8_t)(((const uint8_t *)from->colors)[i] * (200 + (place[0] * 7 + place[1] * (5 + i % 3)) % 56) >> 8);
     pt_cloud_writer_add(town->writer, PT_ARRAY_POSITIONS, (const uint32_t *)from->positions + 2 * first, slots * 8);
     pt_cloud_writer_add(town->writer, PT_ARRAY_SURFELS, from->surfels + first, slots * 4);
+    if (!town->colors)
+        return;
     pt_cloud_writer_add(town->writer, PT_ARRAY_COLORS, town->colors, slots * 3);
     pt_cloud_writer_add(town->writer, PT_ARRAY_SHAPES, from->shapes + first, slots * 4);
 }
@@ -200,7 +202,7 @@ static void pack(struct patina_cloud *quarter)
     quarter->packed = 1;
 }
 
-static void set_numbers(struct patina_cloud *whole, const patina_cloud *quarter, uint32_t quarters)
+static void set_numbers(struct patina_cloud *whole, const patina_cloud *quarter, uint32_t quarters, int plain)
 {
     *whole = *quarter;
     whole->unordered = 1;
@@ -213,29 +215,34 @@ static void set_numbers(struct patina_cloud *whole, const patina_cloud *quarter,
     for (int kind = 0; kind < 6; kind++)
         whole->info.kinds[kind] *= quarters;
     whole->chunks = calloc(whole->chunk_count, sizeof *whole->chunks);
+    if (plain) {
+        whole->color_format = PT_COLOR_NONE;
+        whole->info.has_colors = whole->info.has_shapes = 0;
+    }
 }
 
-uint64_t town_write(const char *path, uint32_t across, uint32_t points, uint32_t levels)
+uint64_t town_write(const char *path, uint32_t across, uint32_t points, uint32_t levels, int plain)
 {
     patina_cloud *quarter = make_quarter(points);
     struct level level[LEVELS_MOST] = {{0, quarter->chunk_count, 0, quarter->slots}};
     if (levels > 1)
         levels_make(quarter, levels, level);
     pack(quarter);
-    struct town town = {.quarter = quarter, .colors = malloc(quarter->slots * 3)};
-    set_numbers(&town.whole, quarter, across * across);
-    if (!town.colors || !town.whole.chunks)
+    struct town town = {.quarter = quarter, .colors = plain ? NULL : malloc(quarter->slots * 3)};
+    set_numbers(&town.whole, quarter, across * across, plain);
+    if ((!plain && !town.colors) || !town.whole.chunks)
         support_die("a town: out of memory");
     CHECK(pt_cloud_writer_begin(path, &town.whole, &town.writer), NULL);
     for (uint32_t k = 0; k < (levels > 1 ? levels : 1); k++)
         add_level(&town, &level[k], across);
     const char end[4] = {0};
-    pt_cloud_writer_add(town.writer, PT_ARRAY_COLORS, end, sizeof end);
+    if (!plain)
+        pt_cloud_writer_add(town.writer, PT_ARRAY_COLORS, end, sizeof end);
     pt_cloud_writer_add(town.writer, PT_ARRAY_CHUNKS, town.whole.chunks, town.whole.chunk_count * sizeof *town.whole.chunks);
     CHECK(pt_cloud_writer_end(town.writer, &town.whole), NULL);
     const uint64_t slots = town.whole.slots;
     free(town.whole.chunks);
     free(town.colors);
     patina_cloud_destroy(quarter);
-    return slots * 19;
+    return slots * (plain ? 12 : 19);
 }

@@ -11,6 +11,7 @@ enum { TOWN_QUARTER = 40 }; // metres on a side
 // A file of across x across quarters, each of so many points, analysed; positions are packed, and points numbered as they lie: 19 bytes
 // each. Fails the test on error. Returns its bytes.
 // levels: 0 or 1, or in how many the points lie: coarse ones first in the file, each level with four times the points of the one before.
-uint64_t town_write(const char *path, uint32_t across, uint32_t points, uint32_t levels);
+// plain: without colours and footprints, 12 bytes each.
+uint64_t town_write(const char *path, uint32_t across, uint32_t points, uint32_t levels, int plain);
 
 #endif
