@@ -31,6 +31,7 @@ from .loader import (
     INTERNAL,
     MEMORY,
     NEIGHBOURHOODS,
+    TOO_MANY_POINTS,
     TYPES,
     PatinaCancelled,
     PatinaError,
@@ -43,8 +44,8 @@ from .loader import (
 )
 
 __all__ = ["CANCELLED", "FILE", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
-           "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "Task", "Texture", "WRAPS", "forget_library",
-           "library", "library_path", "log_lines", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
+           "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "TOO_MANY_POINTS", "Task", "Texture", "WRAPS",
+           "forget_library", "library", "library_path", "log_lines", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
 
 
 KINDS = tuple(abi.KIND)  # patina_kind

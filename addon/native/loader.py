@@ -18,7 +18,8 @@ import numpy as np
 
 from . import abi
 
-MEMORY, FILE, FORMAT, CANCELLED, INTERNAL = (abi.ERROR[f"ERROR_{name}"] for name in ("MEMORY", "FILE", "FORMAT", "CANCELLED", "INTERNAL"))
+MEMORY, FILE, FORMAT, CANCELLED, TOO_MANY_POINTS, INTERNAL = (
+    abi.ERROR[f"ERROR_{name}"] for name in ("MEMORY", "FILE", "FORMAT", "CANCELLED", "TOO_MANY_POINTS", "INTERNAL"))
 
 # Arrays of patina_neighbourhoods: type and width, 0: one number a point, -1: as many as neighbours.
 NEIGHBOURHOODS = {"normal": (np.float32, 3), "axis": (np.float32, 3), "spacing": (np.float32, 0), "half_axes": (np.float32, 2),

@@ -289,6 +289,8 @@ def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: 
         _write_notes(source.kept, *notes)
         known = _linked(native.Cloud.open(source.kept), *notes[:3], found.scans and asdict(found.scans), found.told, source.kept)
     except (native.PatinaError, OSError) as error:
+        if getattr(error, "code", native.FILE) == native.TOO_MANY_POINTS:
+            return found  # is shown without an analysis
         if getattr(error, "code", native.FILE) != native.FILE:
             raise
         known = _opened(source)

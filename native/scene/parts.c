@@ -110,8 +110,8 @@ void pt_parts_follow(struct patina_cloud *cloud)
 int pt_parts_refuse(const struct patina_cloud *cloud, const char *call)
 {
     return cloud->part_count ? pt_fail(&cloud->handle, PATINA_ERROR_TOO_MANY_POINTS,
-                                       "%s: does not take a cloud in parts yet, and %llu points make %u of them", call,
-                                       (unsigned long long)cloud->info.count, cloud->part_count)
+                                       "%s: takes a cloud of up to %llu points, and of %llu not yet", call,
+                                       (unsigned long long)pt_part_slots(), (unsigned long long)cloud->info.count)
                              : PATINA_OK;
 }
 
