@@ -489,8 +489,11 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
     if (code)
         return code;
     int error = map_sections(disk, sections);
-    if (error)
+    if (error) {
+        pt_pages_free(cloud->chunks, sections[0].size);
+        cloud->chunks = NULL;
         return fail_with(path, "mapped", error);
+    }
     struct pt_chunk *chunks = malloc(sections[0].size + 1); // the one array that is not freed as pages
     if (cloud->chunks && chunks)
         memcpy(chunks, cloud->chunks, sections[0].size);
