@@ -2,6 +2,7 @@
 // What shade makes of the points' colours: a ramp over a scalar, a height or a distance; exposure and contrast.
 #include "passes.h"
 #include "base/elementary.h"
+#include "scene/clip.h"
 
 #include <math.h>
 #include <string.h>
@@ -37,8 +38,7 @@ static struct span span_of_boxes(const struct patina_scene *scene, const struct 
     const double *matrix = source == PATINA_COLOR_OBJECT_HEIGHT ? as_it_is : instance->style.world_from_object;
     struct spread spread = {.scene = scene, .distances = source == PATINA_COLOR_DISTANCE, .span = {INFINITY, -INFINITY}};
     pt_camera_axes(&scene->camera, spread.axes, spread.eye);
-    for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
-        pt_chunk_corners(&instance->cloud->chunks[c], matrix, widen, &spread);
+    pt_cloud_corners(instance->cloud, NULL, matrix, widen, &spread);
     return spread.span;
 }
 

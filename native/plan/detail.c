@@ -4,6 +4,7 @@
 #include "eye.h"
 #include "ranges.h"
 #include "scene/clusters.h"
+#include "scene/paged.h"
 
 // A builder's levels need not be exactly twice as wide as the next: what lies within this of a level is of it.
 #define SAME_LEVEL 1.2
@@ -23,7 +24,11 @@ void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *pla
     if (!(scene->settings.detail > 0.0f) || plan->map || scene->settings.surface == PATINA_SURFACE_SPLATS ||
         pt_draws_ranges(scene, plan, instance))
         return;
-    if (cloud->clusters)
+    double finest, coarsest;
+    if (cloud->paged) {
+        pt_page_gaps(cloud, &finest, &coarsest);
+        take_gaps(detail, finest, coarsest);
+    } else if (cloud->clusters)
         for (uint32_t i = 0; i * PT_CLUSTER < cloud->chunk_count; i++)
             take_gaps(detail, cloud->clusters[i].finest, cloud->clusters[i].coarsest);
     else

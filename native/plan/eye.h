@@ -91,10 +91,7 @@ int pt_rect_in_window(const struct view_args *view, const double bounds[4], uint
 // How many of a chunk's points the settings ask for: whole vectors, for the processor draws no part of one.
 uint32_t pt_drawn_points(const struct patina_scene *scene, const struct pt_chunk *chunk);
 
-// pages.c: whether chunk c of the cloud, which a picture or map has in view, has points; its page is wanted where they are on their way.
-int pt_plan_page(const struct patina_cloud *cloud, uint32_t c, const struct pt_eye *camera, const struct pt_object *object,
-                 const struct pt_extent *extent);
-// Whether it is not known to be damaged: else it is not drawn. What is decided by all that is in view counts it, so that nothing depends on
+// pages.c: whether chunk c is not known to be damaged: else it is not drawn. What is decided by all that is in view counts it, so that nothing depends on
 // who found the damage, and when: what is hidden is not looked at.
 int pt_plan_is_sound(const struct patina_scene *scene, const struct patina_cloud *cloud, uint32_t c);
 

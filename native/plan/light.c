@@ -7,6 +7,7 @@
 #include "light_points.h"
 #include "scene/clip.h"
 #include "scene/mask.h"
+#include "scene/paged.h"
 #include "scene/soft.h"
 #include "shared/balls.h"
 #include "base/elementary.h"
@@ -210,16 +211,16 @@ static struct patina_scene as_cut(const struct patina_scene *scene)
 static double ball_radius(const struct pt_instance *instance, int most)
 {
     const double *m = instance->style.world_from_object;
-    double scale = 0.0, reach = 0.0;
+    double scale = 0.0, reach = most ? 0.0 : INFINITY;
     if (instance->style.soft_radius > 0.0f)
         return (double)instance->style.soft_radius;
     for (int c = 0; c < 3; c++)
         scale = fmax(scale, sqrt(m[c] * m[c] + m[4 + c] * m[4 + c] + m[8 + c] * m[8 + c]));
-    for (uint32_t c = 0; c < instance->cloud->chunk_count; c++) {
+    for (uint32_t c = 0; (c = pt_chunk_from(instance->cloud, c)) < instance->cloud->chunk_count; c++) {
         const double own = pt_soft_reach(instance->cloud, &instance->cloud->chunks[c]);
-        reach = most || c == 0 ? fmax(reach, own) : fmin(reach, own);
+        reach = most ? fmax(reach, own) : fmin(reach, own);
     }
-    return scale * (most ? reach : 0.5 * reach);
+    return !isfinite(reach) ? 0.0 : scale * (most ? reach : 0.5 * reach);
 }
 
 // room: NULL: chunks are seen whole.
@@ -228,9 +229,7 @@ static void look_at_points(const struct patina_scene *cut, const struct pt_insta
 {
     const struct pt_sieve sieve = room ? pt_sieve_make(cut, instance, points, room) : (struct pt_sieve){.instance = instance};
     extent->reach = points == PT_SOFT_POINTS ? ball_radius(instance, 1) : 0.0;
-    for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
-        if (pt_sieve_chunk(&sieve, &instance->cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
-            pt_chunk_corners(&instance->cloud->chunks[c], instance->style.world_from_object, extend, extent);
+    pt_cloud_corners(instance->cloud, &sieve, instance->style.world_from_object, extend, extent);
     extent->reach = 0.0;
 }
 

@@ -134,11 +134,10 @@ static int add_test(struct tests *tests, uint32_t instance, const struct pt_inst
     struct pt_plan *map = tests->builder.plan;
     struct pt_receiver *out = &map->receivers[map->receiver_count];
     struct shadow_test_args args = tests->args;
-    int error = pt_plan_chunks(tests->view, map, receiver, &args.instance, &out->chunks);
+    int error = pt_plan_chunks(tests->view, map, receiver, &args.instance, &out->chunks, &out->chunk_count);
     if (error)
         return error;
     out->cloud = instance == PT_PIXELS ? NULL : receiver->cloud;
-    out->chunk_count = receiver->cloud->chunk_count;
     args.base = tests->round->light * (uint32_t)receiver->cloud->slots;
     if (instance == PT_PIXELS)
         args.marked = args.compare = 0;

@@ -487,9 +487,9 @@ void pt_choose_window(const struct patina_scene *scene, struct pt_plan *plan, ui
 static inline uint32_t pt_round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
 // How far, in pixels, the effects of a picture carry influence. (effects.c)
 uint32_t pt_effects_reach(const struct patina_scene *scene);
-// Every chunk of the instance as the plan's view sees it, inside or outside; nothing is culled.
+// Every chunk of the instance that is there as the plan's view sees it, inside or outside; nothing is culled.
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
-                   struct instance_args *args, struct chunk_view **chunks);
+                   struct instance_args *args, struct chunk_view **chunks, uint32_t *count);
 
 // ---- clips and hidden classes: clip.c --------------------------------------------------------------------------------
 

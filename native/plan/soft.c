@@ -4,10 +4,12 @@
 // A part is a slab of depth and rows of the picture. Slabs follow from what the whole picture sees, so that a region is drawn in the
 // same; a ball that reaches into several is in each of them, and each draws what of it lies within. Rows change nothing of a pixel.
 #include "eye.h"
+#include "pages.h"
 #include "passes.h"
 
 #include "scene/clip.h"
 #include "scene/mask.h"
+#include "scene/paged.h"
 #include "scene/soft.h"
 #include "shared/balls.h"
 
@@ -54,8 +56,7 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
         return PATINA_OK;
     const struct patina_cloud *cloud = out->instance->cloud;
     const uint32_t c = (uint32_t)(chunk - cloud->chunks);
-    if (!pt_plan_page(cloud, c, p->eye, object, &extent))
-        return PATINA_OK;
+    pt_paged_look(cloud, c);
     const double pixel = (double)plan->view.footprint * (plan->view.perspective ? fabs(extent.z_beyond) : 1.0) *
                          (double)PT_SOFT_LEAST;
     const struct depths own = {nextafterf((float)(extent.z_before - pixel), -INFINITY),
@@ -85,9 +86,10 @@ static int place_instance(struct placing *p, uint32_t i)
     double rows[9];
     int error = PATINA_OK;
     *out = (struct pt_plan_instance){.kind = PT_AS_SOFT, .instance = instance, .of = i, .marked = pt_is_marked(instance)};
-    out->chunks = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->chunks);
-    out->bounds = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->bounds);
-    struct depths *depths = p->depths[p->plan->soft.count] = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *depths);
+    out->chunks = pt_arena_take(arena, (pt_chunks_there(cloud) + 1) * sizeof *out->chunks);
+    out->bounds = pt_arena_take(arena, (pt_chunks_there(cloud) + 1) * sizeof *out->bounds);
+    struct depths *depths = p->depths[p->plan->soft.count] = pt_arena_take(arena,
+                                                                           (pt_chunks_there(cloud) + 1) * sizeof *depths);
     struct pt_inverse_clip *clips = pt_arena_take(arena, (p->scene->clip_count + 1) * sizeof *clips);
     if (!out->chunks || !out->bounds || !depths || !clips)
         return PATINA_ERROR_MEMORY;
@@ -97,7 +99,12 @@ static int place_instance(struct placing *p, uint32_t i)
     pt_set_instance(p->eye, &object, instance, pt_thinning(p->scene), &out->args);
     pt_set_ids(p->plan, i, 0, &out->args);
     out->as.balls = pt_balls_of(&(struct pt_to_place){p->scene, instance, &object});
-    for (uint32_t c = 0; c < cloud->chunk_count && !error && instance->style.transparency < 1.0f; c++)
+    const struct pt_to_place what = {p->scene, instance, &object};
+    const struct pt_looking looking = {p->eye, PT_AS_SOFT, &what, rows, &sieve, NULL};
+    const uint32_t end = instance->style.transparency < 1.0f ? cloud->chunk_count : 0;
+    const uint64_t taken = end ? pt_plan_absent(&looking) : 0;
+    p->plan->chunks_clipped += pt_all_soft(instance) ? taken : 0;
+    for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < end && !error; c++)
         error = place_chunk(p, out, depths, &sieve, &object, rows, &cloud->chunks[c]);
     p->plan->soft.count += out->chunk_count > 0;
     return error;
@@ -243,7 +250,7 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
     float ends[MOST_SLABS];
     for (uint32_t i = 0; i < scene->cloud_count; i++) {
         instances += scene->instances[i].style.soft != PATINA_SOFT_OFF;
-        chunks += scene->instances[i].style.soft ? scene->instances[i].cloud->chunk_count : 0;
+        chunks += scene->instances[i].style.soft ? pt_chunks_there(scene->instances[i].cloud) : 0;
     }
     if (!instances)
         return PATINA_OK;

@@ -11,9 +11,11 @@
 #include "expected.h"
 #include "eye.h"
 #include "lines.h"
+#include "pages.h"
 #include "ranges.h"
 #include "scene/clip.h"
 #include "scene/clusters.h"
+#include "scene/paged.h"
 #include "base/elementary.h"
 #include "shared/discs.h"
 
@@ -133,23 +135,6 @@ static double stretch_of(const struct pt_eye *camera, const struct pt_extent *ex
 // Pixels beyond the picture that are looked at: whatever the guard will be, the same is seen. It is seldom more.
 enum { AROUND = 160, FARTHEST_FACE = 96 };
 
-// Whether each of a cluster's chunks would be found out of view, or finer than the picture needs. Where the cluster reaches behind the camera and
-// before it, other bounds are looked at than of chunks that do not: nothing follows from these.
-static int is_out(const struct pt_eye *camera, enum pt_kind kind, const struct pt_to_place *what, const double rows[9],
-                  const struct pt_detail *detail, const struct pt_cluster *cluster)
-{
-    double translation[3];
-    struct pt_extent extent;
-    if (!cluster->known)
-        return 0;
-    pt_chunk_translation(camera, what->object, &cluster->around, translation);
-    if (!pt_kind_bounds(camera, kind, what, &cluster->around, rows, translation, &extent))
-        return camera->orthographic || extent.z_beyond < camera->near_clip || extent.z_before >= camera->near_clip;
-    const double before = camera->orthographic ? 1.0 : pt_most(extent.z_before, 0.0);
-    return pt_detail_leaves_out(detail, (double)cluster->around.gap,
-                                pt_most(camera->xs, camera->ys) * before / what->object->scale);
-}
-
 static int look_at_instance(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey, uint32_t i)
 {
     const struct pt_instance *instance = &scene->instances[i];
@@ -159,7 +144,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     int transparent = is_transparent(instance), layered = transparent || scene->settings.layer_passes;
     pt_object_of(camera, instance->style.world_from_object, object);
     int cull = instance->style.cull_back && cloud->info.normals_oriented && !object->singular && !transparent;
-    struct seen *list = pt_arena_take(&plan->arena, (cloud->chunk_count + 1) * sizeof *list);
+    struct seen *list = pt_arena_take(&plan->arena, (pt_chunks_there(cloud) + 1) * sizeof *list);
     struct pt_inverse_clip *clips = pt_arena_take(&plan->arena, (scene->clip_count + 1) * sizeof *clips);
     if (!list || !clips)
         return PATINA_ERROR_MEMORY;
@@ -174,8 +159,12 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     double rows[9];
     pt_object_rows(camera, object, rows);
     const struct pt_cluster *clusters = pt_sieves(&survey->sieves[i]) ? NULL : cloud->clusters; // what clips take is counted
-    for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f && !pt_all_soft(instance); c++) {
-        if (clusters && c % PT_CLUSTER == 0 && is_out(camera, kind, &what, rows, &detail, &clusters[c / PT_CLUSTER])) {
+    const struct pt_looking looking = {camera, kind, &what, rows, &survey->sieves[i], &detail};
+    const uint32_t end = instance->style.transparency < 1.0f && !pt_all_soft(instance) ? cloud->chunk_count : 0;
+    plan->chunks_clipped += end ? pt_plan_absent(&looking) : 0;
+    for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < end; c++) {
+        const struct pt_cluster *cluster = clusters && c % PT_CLUSTER == 0 ? &clusters[c / PT_CLUSTER] : NULL;
+        if (cluster && cluster->known && pt_is_out(&looking, &cluster->around)) {
             c += PT_CLUSTER - 1;
             continue;
         }
@@ -199,8 +188,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         double left_out, rim;
         if (!pt_detail_draws(&detail, chunk, pixel * before / object->scale, &left_out))
             continue;
-        if (!pt_plan_page(cloud, c, camera, object, &seen.extent))
-            continue;
+        pt_paged_look(cloud, c);
         const double stretch = stretch_of(camera, &seen.extent, &rim);
         for (int k = 0; k < 4; k++)
             seen.extent.rect[k] -= AROUND;
@@ -625,12 +613,13 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 }
 
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
-                   struct instance_args *args, struct chunk_view **chunks)
+                   struct instance_args *args, struct chunk_view **chunks, uint32_t *count)
 {
     struct pt_eye camera;
     struct pt_object object;
     int error = pt_eye_of(scene, &camera);
-    *chunks = pt_arena_take(&plan->arena, (instance->cloud->chunk_count + 1) * sizeof **chunks);
+    *chunks = pt_arena_take(&plan->arena, (pt_chunks_there(instance->cloud) + 1) * sizeof **chunks);
+    *count = 0;
     if (error || !*chunks)
         return error ? error : PATINA_ERROR_MEMORY;
     pt_pad_eye(&camera, plan->guard);
@@ -638,8 +627,8 @@ int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const
     pt_set_instance(&camera, &object, instance, 1.0, args);
     double rows[9];
     pt_object_rows(&camera, &object, rows);
-    for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
+    for (uint32_t c = 0; (c = pt_chunk_from(instance->cloud, c)) < instance->cloud->chunk_count; c++)
         pt_set_chunk(&camera, &object, rows, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0,
-                     &(*chunks)[c]);
+                     &(*chunks)[(*count)++]);
     return PATINA_OK;
 }

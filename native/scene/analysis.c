@@ -510,7 +510,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     pt_pages_free(cloud->surfels, cloud->slots * 4);
     pt_pages_free(cloud->shapes, cloud->slots * 4);
     pt_sights_free(&cloud->sights);
-    free(cloud->chunks);
+    pt_chunks_free(cloud);
     cloud->sights = analysis->sights;
     cloud->surfels = analysis->surfels;
     cloud->shapes = analysis->shapes;

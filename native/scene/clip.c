@@ -186,25 +186,26 @@ static int meet(const struct pt_sieve *sieve, uint32_t i, const struct pt_chunk 
     return where;
 }
 
-enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,
-                            struct pt_division *division)
+// How masks, fields and scans divide a chunk.
+struct marked {
+    enum pt_masked masked, left, unseen;
+};
+
+static enum pt_side side_of(const struct pt_sieve *sieve, const struct pt_chunk *chunk, const struct marked *by,
+                            struct clip_view *entries, struct pt_division *division)
 {
     struct pt_division found = {0};
     double linear[9], object[3], origin[3];
-    if (!pt_sieves(sieve))
-        return PT_WHOLE; // of most scenes all are
     int by_class = sieve->hiding ? hides(sieve->instance->style.hidden_classes, chunk->classes) : 0;
     int by_shape = sieve->hiding_shapes ? hides(sieve->hidden_shapes, chunk->shapes) : 0, kept = !sieve->keeping;
-    const size_t place = (size_t)(chunk - sieve->instance->cloud->chunks);
-    const enum pt_masked masked = sieve->mask ? sieve->mask->chunks[place] : PT_MASKED_NONE, left = leaves(sieve, place);
-    const enum pt_masked unseen = sieve->hiding_scans ? hidden_of(sieve, place) : PT_MASKED_NONE;
-    if (by_class == 1 || by_shape == 1 || masked == PT_MASKED_ALL || left == PT_MASKED_ALL || unseen == PT_MASKED_ALL)
+    if (by_class == 1 || by_shape == 1 || by->masked == PT_MASKED_ALL || by->left == PT_MASKED_ALL ||
+        by->unseen == PT_MASKED_ALL)
         return PT_CUT_AWAY;
     found.by_class = by_class != 0;
     found.by_shape = by_shape != 0;
-    found.by_mask = masked == PT_MASKED_SOME;
-    found.by_field = left == PT_MASKED_SOME && !sieve->soft;
-    found.by_scan = unseen == PT_MASKED_SOME;
+    found.by_mask = by->masked == PT_MASKED_SOME;
+    found.by_field = by->left == PT_MASKED_SOME && !sieve->soft;
+    found.by_scan = by->unseen == PT_MASKED_SOME;
     pt_split_matrix(sieve->instance->style.world_from_object, linear, object);
     pt_apply(linear, chunk->origin, origin);
     for (int k = 0; k < 3; k++)
@@ -221,6 +222,23 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
         *division = found;
     return found.count || found.by_class || found.by_shape || found.by_mask || found.by_field || found.by_scan ? PT_DIVIDED
                                                                                                                : PT_WHOLE;
+}
+
+enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,
+                            struct pt_division *division)
+{
+    if (!pt_sieves(sieve))
+        return PT_WHOLE; // of most scenes all are
+    const size_t place = (size_t)(chunk - sieve->instance->cloud->chunks);
+    const struct marked by = {sieve->mask ? sieve->mask->chunks[place] : PT_MASKED_NONE, leaves(sieve, place),
+                              sieve->hiding_scans ? hidden_of(sieve, place) : PT_MASKED_NONE};
+    return side_of(sieve, chunk, &by, entries, division);
+}
+
+enum pt_side pt_sieve_page(const struct pt_sieve *sieve, const struct pt_chunk *box)
+{
+    const struct marked none = {PT_MASKED_NONE, PT_MASKED_NONE, PT_MASKED_NONE};
+    return pt_sieves(sieve) ? side_of(sieve, box, &none, NULL, NULL) : PT_WHOLE;
 }
 
 void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3], struct clip_view *out)

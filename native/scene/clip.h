@@ -57,6 +57,11 @@ static inline int pt_sieves(const struct pt_sieve *sieve)
     return sieve->count || sieve->keeping || sieve->hiding || sieve->hiding_shapes || sieve->mask || sieve->field ||
            sieve->hiding_scans;
 }
+// Of a page that is on its way, which it leaves or takes.
+enum pt_side pt_sieve_page(const struct pt_sieve *sieve, const struct pt_chunk *box);
+// Calls back with the corners of what the sieve leaves of a cloud (NULL: of all): of its chunks' boxes, and of pages that are on their way.
+void pt_cloud_corners(const struct patina_cloud *cloud, const struct pt_sieve *sieve, const double matrix[16],
+                      pt_corner_work *work, void *context);
 // chunk: one of the cloud's. entries: room for the sieve's clips; may be NULL, as may division. Written where the chunk is divided.
 enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,
                             struct pt_division *division);

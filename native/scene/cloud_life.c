@@ -33,10 +33,10 @@ void patina_cloud_destroy(patina_cloud *cloud)
     for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
         pt_pages_free(*sections[i].data, sections[i].size);
     pt_sights_free(&cloud->sights);
+    pt_chunks_free(cloud);
     pt_paged_destroy(cloud);
     pt_page_sums_destroy(cloud->page_sums);
     free(cloud->begins);
-    free(cloud->chunks);
     free(cloud->clusters);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
     pt_alive_release(cloud->alive);

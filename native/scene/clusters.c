@@ -30,6 +30,17 @@ static void widen(struct pt_cluster *cluster, const struct pt_chunk *chunk, doub
     cluster->finest = gap > 0.0 && !(cluster->finest > 0.0 && cluster->finest <= gap) ? gap : cluster->finest;
 }
 
+void pt_cluster_box(const double low[3], const double high[3], struct pt_chunk *around)
+{
+    for (int k = 0; k < 3; k++) {
+        const double middle = 0.5 * low[k] + 0.5 * high[k], half = 0.5 * high[k] - 0.5 * low[k];
+        const double far = half * (1.0 + WIDER) + fmax(fabs(low[k]), fabs(high[k])) * FARTHER;
+        around->origin[k] = middle;
+        around->box_max[k] = nextafterf((float)far, INFINITY);
+        around->box_min[k] = -around->box_max[k];
+    }
+}
+
 static void make(const struct pt_chunk *chunks, uint32_t count, struct pt_cluster *cluster)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -41,13 +52,7 @@ static void make(const struct pt_chunk *chunks, uint32_t count, struct pt_cluste
         levels &= chunks[c].gap > 0.0f;
     }
     cluster->around.gap = levels ? (float)cluster->coarsest : 0.0f;
-    for (int k = 0; k < 3; k++) {
-        const double middle = 0.5 * low[k] + 0.5 * high[k], half = 0.5 * high[k] - 0.5 * low[k];
-        const double far = half * (1.0 + WIDER) + fmax(fabs(low[k]), fabs(high[k])) * FARTHER;
-        cluster->around.origin[k] = middle;
-        cluster->around.box_max[k] = nextafterf((float)far, INFINITY);
-        cluster->around.box_min[k] = -cluster->around.box_max[k];
-    }
+    pt_cluster_box(low, high, &cluster->around);
 }
 
 void pt_clusters_make(struct patina_cloud *cloud)

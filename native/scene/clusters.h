@@ -20,4 +20,7 @@ struct pt_cluster {
 // none.
 void pt_clusters_make(struct patina_cloud *cloud);
 
+// The place of what lies around all within a box, a little wider than this.
+void pt_cluster_box(const double low[3], const double high[3], struct pt_chunk *around);
+
 #endif

@@ -261,14 +261,6 @@ int pt_dense_chunks(const struct patina_cloud *cloud, struct pt_dense *boxes)
 {
     struct search search = {.cloud = cloud, .strata = PT_STRATA};
     uint64_t wide = 0;
-    if (cloud->paged) { // its own box: what is on its way might be no stray, and levels are no sparse points
-        for (uint32_t c = 0; c < cloud->chunk_count; c++)
-            for (int k = 0; k < 3; k++) {
-                boxes[c].lower[k] = cloud->info.box_min[k];
-                boxes[c].upper[k] = cloud->info.box_max[k];
-            }
-        return PATINA_OK;
-    }
     if (find_spacing(&search))
         return PATINA_ERROR_MEMORY;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {

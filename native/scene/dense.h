@@ -9,7 +9,7 @@ struct pt_dense { // object units; of a chunk of strays lower > upper
     double lower[3], upper[3];
 };
 
-// One for every chunk; its own box where it has no strays. 0 or PATINA_ERROR_MEMORY.
+// One for every chunk of a cloud that is not in pages; its own box where it has no strays. 0 or PATINA_ERROR_MEMORY.
 int pt_dense_chunks(const struct patina_cloud *cloud, struct pt_dense *boxes);
 
 #endif

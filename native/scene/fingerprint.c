@@ -4,6 +4,7 @@
 #include "cloud.h"
 #include "base/error.h"
 #include "fingerprint.h"
+#include "paged.h"
 
 #include <string.h>
 
@@ -95,8 +96,24 @@ static uint64_t fingerprint_array(uint64_t seed, const struct patina_cloud *clou
     return end(ways, seed, left_over, data, size);
 }
 
+// Of a cloud whose points are on their way, what is there.
+static uint64_t fingerprint_there(const struct patina_cloud *cloud)
+{
+    const uint64_t bytes = 4 * pt_position_words(cloud);
+    uint64_t hash = cloud->info.count;
+    for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < cloud->chunk_count; c++) {
+        const struct pt_chunk *chunk = &cloud->chunks[c];
+        hash = pt_fingerprint(mix(hash, c), (const char *)cloud->positions + chunk->first * bytes, chunk->padded * bytes);
+        hash = pt_fingerprint(hash, cloud->surfels + chunk->first, chunk->padded * sizeof *cloud->surfels);
+        hash = pt_fingerprint(hash, chunk->origin, sizeof chunk->origin);
+    }
+    return hash;
+}
+
 static uint64_t fingerprint_of(const struct patina_cloud *cloud)
 {
+    if (pt_paged_absent(cloud))
+        return fingerprint_there(cloud);
     const size_t size = cloud->slots * 4 * pt_position_words(cloud);
     uint64_t hash = fingerprint_array(cloud->info.count, cloud, cloud->positions, size);
     hash = fingerprint_array(hash, cloud, cloud->surfels, cloud->slots * 4);

@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 struct framing {
     double (*corners)[3]; // of what is framed
@@ -38,15 +39,35 @@ static void keep_corner(void *context, const double corner[3])
     f->count++;
 }
 
+static void count(void *context, const double corner[3])
+{
+    (void)corner;
+    ++*(size_t *)context;
+}
+
+// Of a cloud in pages its own box, where something of it is left: what is on its way might be no stray, and levels are no sparse points.
+static void keep_pages(const struct pt_instance *instance, const struct pt_sieve *sieve, struct framing *f)
+{
+    const patina_cloud_info *info = &instance->cloud->info;
+    size_t corners = 0;
+    pt_cloud_corners(instance->cloud, sieve, instance->style.world_from_object, count, &corners);
+    if (corners)
+        pt_box_corners(info->box_min, info->box_max, instance->style.world_from_object, keep_corner, f);
+}
+
 static int keep_instance(const patina_scene *scene, const struct pt_instance *instance, struct framing *f)
 {
     const patina_cloud *cloud = instance->cloud;
     struct pt_inverse_clip *room = malloc((scene->clip_count + 1) * sizeof *room);
-    struct pt_dense *boxes = malloc((cloud->chunk_count + 1) * sizeof *boxes);
-    f->error = !room || !boxes ? PATINA_ERROR_MEMORY : pt_dense_chunks(cloud, boxes);
+    struct pt_dense *boxes = cloud->paged ? NULL : malloc((cloud->chunk_count + 1) * sizeof *boxes);
+    f->error = !room || (!boxes && !cloud->paged) ? PATINA_ERROR_MEMORY
+               : cloud->paged                     ? PATINA_OK
+                                                  : pt_dense_chunks(cloud, boxes);
     if (!f->error) {
         const struct pt_sieve sieve = pt_sieve_make(scene, instance, PT_EVERY_POINT, room);
-        for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        if (cloud->paged)
+            keep_pages(instance, &sieve, f);
+        for (uint32_t c = 0; boxes && c < cloud->chunk_count; c++)
             if (boxes[c].lower[0] <= boxes[c].upper[0] && pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
                 pt_box_corners(boxes[c].lower, boxes[c].upper, instance->style.world_from_object, keep_corner, f);
     }
@@ -129,6 +150,11 @@ int patina_cloud_dense_box(const patina_cloud *cloud, double box_min[3], double 
 {
     if (!cloud || !box_min || !box_max)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_dense_box: bad arguments");
+    if (cloud->paged) {
+        memcpy(box_min, cloud->info.box_min, sizeof cloud->info.box_min);
+        memcpy(box_max, cloud->info.box_max, sizeof cloud->info.box_max);
+        return PATINA_OK;
+    }
     struct pt_dense *boxes = malloc((cloud->chunk_count + 1) * sizeof *boxes);
     if (!boxes || pt_dense_chunks(cloud, boxes)) {
         free(boxes);

@@ -4,7 +4,9 @@
 
 #include "base/compare.h"
 #include "base/descriptor.h"
+#include "base/platform.h"
 #include "fingerprint.h"
+#include "parts.h"
 #include "shared/view.h"
 #include "shared/words.h"
 
@@ -17,101 +19,89 @@ static uint32_t bytes_of_point(const struct patina_cloud *cloud)
     return 20 + (uint32_t)pt_color_size(cloud->color_format) + 4 * cloud->info.has_scalars + cloud->info.has_classes;
 }
 
-void pt_page_empty(const struct patina_cloud *cloud, const struct pt_page *page, uint32_t i)
-{
-    struct pt_chunk *chunk = &cloud->chunks[page->first_chunk + i];
-    const uint32_t first = chunk->first, slots = chunk->padded;
-    *chunk = (struct pt_chunk){.first = first, .padded = slots, .cone_cosine = -2.0f, .gap = (float)page->told.gap};
-    memset(chunk->classes, 0xFF, sizeof chunk->classes);
-    memset(chunk->shapes, 0xFF, sizeof chunk->shapes);
-    for (int k = 0; k < 3; k++) {
-        const double low = page->told.box_min[k], high = page->told.box_max[k];
-        chunk->origin[k] = low + 0.5 * (high - low);
-        chunk->box_min[k] = nextafterf((float)(low - chunk->origin[k]), -INFINITY);
-        chunk->box_max[k] = nextafterf((float)(high - chunk->origin[k]), INFINITY);
-    }
-}
-
 // ---- what arrived becomes part of the cloud ----------------------------------------------------------------------------
 
 // Whether one of the last two pictures would have had it. What nobody looks at counts as if it were there: a picture for which all has
 // arrived that it shows is that of the whole cloud.
-static int is_missing(const struct pt_paged *paged, const struct pt_page *page)
+static int is_missing(const struct pt_page_mark *mark, uint32_t pictures)
 {
-    return atomic_load(&page->state) != PT_PAGE_PRESENT && atomic_load(&page->used) + 2 >= atomic_load(&paged->pictures);
+    return atomic_load(&mark->state) != PT_PAGE_PRESENT && atomic_load(&mark->used) + 2 >= pictures;
 }
 
 // Points as dense as those of a page, of all over it and of all beneath it together, in points per area. A page's points tell how large
 // its surface is; what lies beneath it shares that surface.
-static int densities(const struct pt_paged *paged, double *over, double *beneath)
+static void densities(struct pt_paged *paged)
 {
-    double *own = calloc(paged->page_count + 1u, sizeof *own);
-    if (!own)
-        return PATINA_ERROR_MEMORY;
-    for (uint32_t p = paged->page_count; p-- > 0;) { // points of its subtree, leaves first
-        const struct pt_page *page = &paged->pages[p];
-        own[p] += is_missing(paged, page) ? 0.0 : page->told.count;
-        if (page->told.parent != PATINA_NO_PAGE)
-            own[page->told.parent] += own[p];
+    double *beneath = paged->beneath, *over = paged->over;
+    const uint32_t pictures = atomic_load(&paged->pictures);
+    memset(beneath, 0, paged->page_count * sizeof *beneath);
+    for (uint32_t p = paged->page_count;
+         p-- > 0;) { // points of its subtree that are missing, leaves first; all are whole numbers
+        const struct pt_page_mark *mark = &paged->marks[p];
+        beneath[p] += is_missing(mark, pictures) ? mark->count : 0.0;
+        if (beneath[p] > 0.0 && mark->parent != PATINA_NO_PAGE)
+            beneath[mark->parent] += beneath[p];
     }
-    for (uint32_t p = 0; p < paged->page_count; p++) {
-        const struct pt_page *page = &paged->pages[p], *parent = &paged->pages[page->told.parent];
-        const int has = page->told.parent != PATINA_NO_PAGE;
-        over[p] = has ? over[page->told.parent] : 0.0;
-        if (has && atomic_load(&parent->state) == PT_PAGE_PRESENT && parent->area > 0.0)
-            over[p] += parent->told.count / parent->area;
-        beneath[p] = own[p] / page->told.count; // times what its own points come to
+    for (uint32_t i = 0; i < paged->present; i++) {
+        const uint32_t p = paged->there[i];
+        uint32_t above = paged->marks[p].parent;
+        while (above != PATINA_NO_PAGE && atomic_load(&paged->marks[above].state) != PT_PAGE_PRESENT)
+            above = paged->marks[above].parent;
+        const double area = above == PATINA_NO_PAGE ? 0.0 : paged->pages[above].arrived->area;
+        over[p] = above == PATINA_NO_PAGE ? 0.0 : over[above] + (area > 0.0 ? paged->marks[above].count / area : 0.0);
+        beneath[p] = (paged->totals[p] - beneath[p]) / paged->marks[p].count; // times what its own points come to
     }
-    free(own);
-    return PATINA_OK;
+}
+
+// The part that a page's chunks are of.
+static const struct patina_cloud *part_of(const struct pt_paged *paged, const struct pt_page *page)
+{
+    const struct patina_cloud *whole = paged->whole;
+    uint32_t low = 0, high = pt_part_count(whole);
+    while (high - low > 1) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (pt_part(whole, middle)->first_chunk <= page->first_chunk)
+            low = middle;
+        else
+            high = middle;
+    }
+    return pt_part(whole, low);
 }
 
 // The page's chunks: spacings of all that is there, and their classes in the words of the points. Whether any changed.
-static int settle_page(struct patina_cloud *cloud, const struct pt_page *page, double over, double beneath)
+static int settle_page(struct pt_paged *paged, uint32_t p)
 {
+    const struct patina_cloud *whole = paged->whole;
+    const struct pt_page *page = &paged->pages[p];
+    uint32_t *surfels = whole->surfels + page->first_slot;
     int changed = 0;
     for (uint32_t i = 0; i < page->chunk_count; i++) {
-        struct pt_chunk *chunk = &cloud->chunks[page->first_chunk + i];
-        const double own = (double)page->chunks[i].spacing;
-        const float spacing = own > 0.0 ? (float)(1.0 / sqrt(over + beneath / (own * own))) : 0.0f;
+        struct pt_chunk *chunk = &whole->chunks[page->first_chunk + i];
+        const double own = (double)page->arrived->chunks[i].spacing;
+        const float spacing = own > 0.0 ? (float)(1.0 / sqrt(paged->over[p] + paged->beneath[p] / (own * own))) : 0.0f;
         changed |= chunk->spacing != spacing;
         chunk->spacing = chunk->built = spacing;
-        uint32_t *surfels = cloud->surfels + chunk->first;
-        const uint32_t class = pt_class_of_spacing((double)spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
+        const uint32_t class = pt_class_of_spacing((double)spacing, whole->spacing_base) << PT_SPACING_SHIFT;
         const uint32_t normals = (1u << PT_SPACING_SHIFT) - 1u;
         if ((surfels[0] & ~normals) != class)
             for (uint32_t k = 0; k < chunk->padded; k++)
                 surfels[k] = (surfels[k] & normals) | class;
+        surfels += chunk->padded;
     }
     return changed;
 }
 
-static void sum_up(struct patina_cloud *cloud)
+static void settle_spacings(struct patina_cloud *cloud)
 {
     struct pt_paged *paged = cloud->paged;
     patina_cloud_info *info = &cloud->info;
-    double *known = malloc((cloud->chunk_count + 1u) * sizeof *known);
+    double *known = malloc((paged->present_chunks + 1u) * sizeof *known);
     uint32_t count = 0;
-    info->drawn = paged->points;
-    info->bytes = paged->held + cloud->chunk_count * sizeof *cloud->chunks;
-    info->invalid_normals = info->invalid_colors = 0;
-    memset(info->class_bits, 0, sizeof info->class_bits);
-    float least = INFINITY, most = -INFINITY;
-    for (uint32_t p = 0; p < paged->page_count; p++) {
-        const struct pt_page *page = &paged->pages[p];
-        if (atomic_load(&page->state) != PT_PAGE_PRESENT)
-            continue;
-        info->invalid_normals += page->info.invalid_normals;
-        info->invalid_colors += page->info.invalid_colors;
-        for (int k = 0; k < 8; k++)
-            info->class_bits[k] |= page->info.class_bits[k];
-        least = fminf(least, page->info.scalar_range[0]);
-        most = fmaxf(most, page->info.scalar_range[1]);
-        for (uint32_t i = 0; known && i < page->chunk_count; i++)
-            known[count++] = (double)cloud->chunks[page->first_chunk + i].spacing;
+    for (uint32_t i = 0; known && i < paged->present; i++) {
+        const struct pt_page *page = &paged->pages[paged->there[i]];
+        for (uint32_t c = 0; c < page->chunk_count; c++)
+            known[count++] = (double)cloud->chunks[page->first_chunk + c].spacing;
     }
-    info->scalar_range[0] = least <= most ? least : 0.0f;
-    info->scalar_range[1] = least <= most ? most : 0.0f;
     if (count) {
         qsort(known, count, sizeof *known, pt_compare_doubles);
         info->spacing = known[count / 2];
@@ -121,14 +111,69 @@ static void sum_up(struct patina_cloud *cloud)
         cloud->built = info->spacing;
     }
     free(known);
+}
+
+// What parts have of their own stays.
+static void tell_parts(struct patina_cloud *whole)
+{
+    const struct pt_paged *paged = whole->paged;
+    for (uint32_t i = 0; i < whole->part_count; i++) {
+        struct patina_cloud *part = &whole->parts[i];
+        part->info = whole->info;
+        part->info.chunks = part->chunk_count;
+        part->info.drawn = 0;
+        part->built = whole->built;
+        part->class_hash = whole->class_hash;
+        atomic_store(&part->alive->fingerprint, 0);
+        atomic_fetch_add(&part->alive->pages, 1);
+    }
+    for (uint32_t i = 0; i < paged->present && whole->part_count; i++) {
+        const struct pt_page *page = &paged->pages[paged->there[i]];
+        whole->parts[part_of(paged, page) - whole->parts].info.drawn += page->told.count;
+    }
+}
+
+static void sum_up(struct patina_cloud *cloud)
+{
+    struct pt_paged *paged = cloud->paged;
+    patina_cloud_info *info = &cloud->info;
+    info->drawn = paged->points;
+    info->bytes = paged->held + paged->present_chunks * sizeof *cloud->chunks;
+    info->invalid_normals = info->invalid_colors = 0;
+    memset(info->class_bits, 0, sizeof info->class_bits);
+    float least = INFINITY, most = -INFINITY;
+    for (uint32_t i = 0; i < paged->present; i++) {
+        const patina_cloud_info *own = &paged->pages[paged->there[i]].arrived->info;
+        info->invalid_normals += own->invalid_normals;
+        info->invalid_colors += own->invalid_colors;
+        for (int k = 0; k < 8; k++)
+            info->class_bits[k] |= own->class_bits[k];
+        least = fminf(least, own->scalar_range[0]);
+        most = fmaxf(most, own->scalar_range[1]);
+    }
+    info->scalar_range[0] = least <= most ? least : 0.0f;
+    info->scalar_range[1] = least <= most ? most : 0.0f;
+    settle_spacings(cloud);
     const int whole = paged->present == paged->page_count; // as a saved file has it
     cloud->class_hash = !info->has_classes ? 0
                         : whole            ? pt_fingerprint(1, cloud->classes, cloud->slots)
                                            : pt_fingerprint(cloud->class_hash, &paged->points, sizeof paged->points);
+    atomic_store(&cloud->alive->fingerprint, 0);
+    atomic_fetch_add(&cloud->alive->pages, 1);
+    tell_parts(cloud);
 }
 
-static void drop_page(struct patina_cloud *cloud, struct pt_page *page)
+static void count_below(struct pt_paged *paged, uint32_t p, uint32_t by)
 {
+    const uint32_t parent = paged->marks[p].parent;
+    if (parent != PATINA_NO_PAGE)
+        paged->marks[parent].below += by;
+}
+
+static void drop_page(struct patina_cloud *cloud, uint32_t p)
+{
+    struct pt_paged *paged = cloud->paged;
+    struct pt_page *page = &paged->pages[p];
     struct pt_section sections[PT_ARRAYS];
     pt_cloud_sections(cloud, sections);
     static const enum pt_array points[] = {PT_ARRAY_POSITIONS, PT_ARRAY_ORDER,   PT_ARRAY_SURFELS,
@@ -137,104 +182,152 @@ static void drop_page(struct patina_cloud *cloud, struct pt_page *page)
     for (size_t i = 0; i < sizeof points / sizeof *points; i++)
         if (sections[points[i]].size)
             pt_pages_forget((char *)*sections[points[i]].data + page->first_slot * bytes[i], page->slots * bytes[i]);
-    free(page->chunks);
-    page->chunks = NULL;
-    for (uint32_t i = 0; i < page->chunk_count; i++)
-        pt_page_empty(cloud, page, i);
-    cloud->paged->held -= page->slots * bytes_of_point(cloud);
-    cloud->paged->points -= page->told.count;
-    cloud->paged->present--;
-    cloud->paged->returned++;
-    atomic_fetch_sub(&cloud->paged->arrived, 1);
-    atomic_store(&page->wanted, 0);
-    atomic_store(&page->state, PT_PAGE_ABSENT);
+    pt_arrived_free(page);
+    memset(cloud->chunks + page->first_chunk, 0, page->chunk_count * sizeof *cloud->chunks);
+    paged->held -= page->slots * bytes_of_point(cloud);
+    paged->points -= page->told.count;
+    paged->returned++;
+    count_below(paged, p, -1u);
+    atomic_fetch_sub(&paged->arrived, 1);
+    atomic_store(&paged->marks[p].wanted, 0);
+    atomic_store(&paged->marks[p].state, PT_PAGE_ABSENT);
 }
 
-// Of pages that no later picture wanted, and that no present one lies beneath, those of the earliest picture go first.
+// ---- pages are given back ----------------------------------------------------------------------------------------------
+
+struct oldest { // a heap
+    const struct pt_page_mark *marks;
+    uint32_t *pages, count;
+};
+
+static int goes_first(const struct oldest *heap, uint32_t a, uint32_t b)
+{
+    const uint32_t x = atomic_load(&heap->marks[a].used), y = atomic_load(&heap->marks[b].used);
+    return x != y ? x < y : a > b;
+}
+
+static void put(struct oldest *heap, uint32_t page)
+{
+    uint32_t at = heap->count++;
+    for (; at && goes_first(heap, page, heap->pages[(at - 1) / 2]); at = (at - 1) / 2)
+        heap->pages[at] = heap->pages[(at - 1) / 2];
+    heap->pages[at] = page;
+}
+
+static uint32_t take(struct oldest *heap)
+{
+    const uint32_t first = heap->pages[0], last = heap->pages[--heap->count];
+    uint32_t at = 0;
+    for (uint32_t next = 1; next < heap->count; next = 2 * at + 1) {
+        next += next + 1 < heap->count && goes_first(heap, heap->pages[next + 1], heap->pages[next]);
+        if (!goes_first(heap, heap->pages[next], last))
+            break;
+        heap->pages[at] = heap->pages[next];
+        at = next;
+    }
+    heap->pages[at] = last;
+    return first;
+}
+
+static int may_go(const struct pt_paged *paged, uint32_t p)
+{
+    const struct pt_page_mark *mark = &paged->marks[p];
+    return atomic_load(&mark->state) == PT_PAGE_PRESENT && !mark->below &&
+           atomic_load(&mark->used) + 1 < atomic_load(&paged->pictures);
+}
+
+// Of pages that no later picture wanted, and that no present one lies beneath, those of the earliest picture go first. Where all are
+// needed the cap is overshot.
 static int give_back(struct patina_cloud *cloud)
 {
     struct pt_paged *paged = cloud->paged;
-    const uint32_t now = atomic_load(&paged->pictures);
+    if (!paged->cap || paged->held <= paged->cap)
+        return 0;
+    struct oldest heap = {.marks = paged->marks, .pages = malloc((paged->present + 1u) * sizeof *heap.pages)};
     int some = 0;
-    while (paged->cap && paged->held > paged->cap) {
-        uint8_t *parents = calloc(paged->page_count + 1u, 1);
-        struct pt_page *oldest = NULL;
-        if (!parents)
-            break;
-        for (uint32_t p = 0; p < paged->page_count; p++)
-            if (atomic_load(&paged->pages[p].state) == PT_PAGE_PRESENT && paged->pages[p].told.parent != PATINA_NO_PAGE)
-                parents[paged->pages[p].told.parent] = 1;
-        for (uint32_t p = 0; p < paged->page_count; p++) {
-            struct pt_page *page = &paged->pages[p];
-            if (atomic_load(&page->state) != PT_PAGE_PRESENT || parents[p] || atomic_load(&page->used) + 1 >= now)
-                continue;
-            if (!oldest || atomic_load(&page->used) <= atomic_load(&oldest->used))
-                oldest = page;
-        }
-        free(parents);
-        if (!oldest) // all are needed: the cap is overshot
-            break;
-        drop_page(cloud, oldest);
+    for (uint32_t i = 0; heap.pages && i < paged->present; i++)
+        if (may_go(paged, paged->there[i]))
+            put(&heap, paged->there[i]);
+    while (heap.count && paged->held > paged->cap) {
+        const uint32_t p = take(&heap), parent = paged->marks[p].parent;
+        drop_page(cloud, p);
+        if (parent != PATINA_NO_PAGE && may_go(paged, parent))
+            put(&heap, parent);
         some = 1;
     }
+    free(heap.pages);
     return some;
 }
 
-static int publish(struct patina_cloud *cloud, struct pt_page *page)
+// ---- pages arrive ------------------------------------------------------------------------------------------------------
+
+static void publish(struct patina_cloud *cloud, uint32_t p)
 {
+    struct pt_paged *paged = cloud->paged;
+    struct pt_page *page = &paged->pages[p];
+    uint64_t first = page->first_slot - part_of(paged, page)->first_slot;
     double area = 0.0;
     for (uint32_t i = 0; i < page->chunk_count; i++) {
         struct pt_chunk *chunk = &cloud->chunks[page->first_chunk + i];
-        const uint32_t first = chunk->first;
-        *chunk = page->chunks[i];
-        chunk->first = first;
+        *chunk = page->arrived->chunks[i];
+        chunk->first = (uint32_t)first;
         chunk->gap = (float)page->told.gap;
+        first += chunk->padded;
         area += chunk->count * (double)chunk->spacing * (double)chunk->spacing;
+        paged->page_of[page->first_chunk + i] = p;
     }
-    page->area = area;
-    cloud->paged->held += page->slots * bytes_of_point(cloud);
-    cloud->paged->points += page->told.count;
-    cloud->paged->present++;
-    atomic_fetch_sub(&cloud->paged->coming, page->told.count);
-    atomic_store(&page->used, atomic_load(&cloud->paged->pictures));
-    atomic_store(&page->state, PT_PAGE_PRESENT);
-    return 1;
+    page->arrived->area = area;
+    paged->held += page->slots * bytes_of_point(cloud);
+    paged->points += page->told.count;
+    count_below(paged, p, 1);
+    atomic_fetch_sub(&paged->coming, page->told.count);
+    atomic_store(&paged->marks[p].used, atomic_load(&paged->pictures));
+    atomic_store(&paged->marks[p].state, PT_PAGE_PRESENT);
+}
+
+static void gather_present(struct pt_paged *paged)
+{
+    paged->present = paged->present_chunks = 0;
+    for (uint32_t p = 0; p < paged->page_count; p++)
+        if (atomic_load(&paged->marks[p].state) == PT_PAGE_PRESENT) {
+            paged->there[paged->present++] = p;
+            paged->present_chunks += paged->pages[p].chunk_count;
+        }
 }
 
 // With the lock, and nobody inside.
 static void renew_chunks(struct patina_cloud *cloud)
 {
     struct pt_paged *paged = cloud->paged;
-    int some = 0;
-    for (uint32_t p = 0; p < paged->page_count && atomic_load(&paged->coming); p++)
-        if (atomic_load(&paged->pages[p].state) == PT_PAGE_STAGED)
-            some |= publish(cloud, &paged->pages[p]);
-    some |= give_back(cloud);
-    if (!some && paged->present == paged->page_count)
+    int some = paged->waiting > 0;
+    for (uint32_t i = 0; i < paged->waiting; i++)
+        publish(cloud, paged->staged[i]);
+    paged->waiting = 0;
+    if (some)
+        gather_present(paged);
+    if (give_back(cloud)) {
+        gather_present(paged);
+        some = 1;
+    }
+    if (!some && (!paged->present || paged->present == paged->page_count))
         return;
-    double *over = malloc(2 * ((size_t)paged->page_count + 1) * sizeof *over);
-    if (over && !densities(paged, over, over + paged->page_count)) // without memory spacings stay as they are
-        for (uint32_t p = 0; p < paged->page_count; p++)
-            if (atomic_load(&paged->pages[p].state) == PT_PAGE_PRESENT)
-                some |= settle_page(cloud, &paged->pages[p], over[p], over[paged->page_count + p]);
-    free(over);
-    if (!some)
-        return;
-    sum_up(cloud);
-    atomic_store(&cloud->alive->fingerprint, 0);
-    atomic_fetch_add(&cloud->alive->pages, 1);
+    densities(paged);
+    for (uint32_t i = 0; i < paged->present; i++)
+        some |= settle_page(paged, paged->there[i]);
+    if (some)
+        sum_up(cloud);
 }
 
-// The door of pictures is const, for what they see does not change; what arrived is no part of any picture yet.
+// The door of pictures is const, for what they see does not change; what arrived is no part of any picture yet. Of parts the first opens it.
 void pt_paged_enter(const struct patina_cloud *cloud, int renew)
 {
     if (!cloud->paged)
         return;
     pt_mutex_lock(&cloud->paged->lock);
-    if (renew)
+    if (renew && !cloud->first_chunk)
         atomic_fetch_add(&cloud->paged->pictures, 1);
-    if (renew && !cloud->paged->inside)
-        renew_chunks((struct patina_cloud *)(uintptr_t)cloud);
+    if (renew && !cloud->first_chunk && !cloud->paged->inside)
+        renew_chunks(cloud->paged->whole);
     cloud->paged->inside++;
     pt_mutex_unlock(&cloud->paged->lock);
 }
@@ -246,11 +339,6 @@ void pt_paged_leave(const struct patina_cloud *cloud)
     pt_mutex_lock(&cloud->paged->lock);
     cloud->paged->inside--;
     pt_mutex_unlock(&cloud->paged->lock);
-}
-
-int pt_paged_absent(const struct patina_cloud *cloud)
-{
-    return cloud->paged && atomic_load(&cloud->paged->arrived) < cloud->paged->page_count;
 }
 
 int pt_paged_refuse(const struct patina_cloud *cloud, const char *call)
@@ -269,22 +357,27 @@ static float float_of(uint32_t bits)
     return f;
 }
 
-int pt_paged_look(const struct patina_cloud *cloud, uint32_t c, double gap)
+static void use(const struct pt_paged *paged, struct pt_page_mark *mark)
 {
-    struct pt_paged *paged = cloud->paged;
-    if (!paged)
-        return 1;
-    struct pt_page *page = &paged->pages[paged->page_of[c]];
-    atomic_store_explicit(&page->used, atomic_load_explicit(&paged->pictures, memory_order_relaxed), memory_order_relaxed);
-    if (cloud->chunks[c].count)
-        return 1;
+    atomic_store_explicit(&mark->used, atomic_load_explicit(&paged->pictures, memory_order_relaxed), memory_order_relaxed);
+}
+
+void pt_paged_look(const struct patina_cloud *cloud, uint32_t c)
+{
+    if (cloud->paged)
+        use(cloud->paged, &cloud->paged->marks[cloud->paged->page_of[cloud->first_chunk + c]]);
+}
+
+void pt_page_want(const struct patina_cloud *cloud, uint32_t page, double gap)
+{
+    struct pt_page_mark *mark = &cloud->paged->marks[page];
     const float wide = gap > 1e-30 ? (float)fmin(gap, 1e30) : 1e-30f;
     uint32_t bits;
+    use(cloud->paged, mark);
     memcpy(&bits, &wide, sizeof bits); // of positive floats the greater has the greater bits
-    unsigned known = atomic_load(&page->wanted);
-    while (bits > known && !atomic_compare_exchange_weak(&page->wanted, &known, bits))
+    unsigned known = atomic_load(&mark->wanted);
+    while (bits > known && !atomic_compare_exchange_weak(&mark->wanted, &known, bits))
         ;
-    return 0;
 }
 
 struct wish {
@@ -312,12 +405,12 @@ int patina_cloud_wanted(patina_cloud *cloud, double least_px, uint32_t *pages, u
     uint32_t found = 0;
     uint64_t points = 0;
     for (uint32_t p = 0; p < paged->page_count; p++) {
-        struct pt_page *page = &paged->pages[p];
-        const float gap = float_of(atomic_exchange(&page->wanted, 0));
-        if (!(gap > 0.0f) || !((double)gap > least_px) || atomic_load(&page->state) != PT_PAGE_ABSENT)
+        struct pt_page_mark *mark = &paged->marks[p];
+        const float gap = atomic_load(&mark->wanted) ? float_of(atomic_exchange(&mark->wanted, 0)) : 0.0f;
+        if (!(gap > 0.0f) || !((double)gap > least_px) || atomic_load(&mark->state) != PT_PAGE_ABSENT)
             continue;
         list[found++] = (struct wish){gap, p};
-        points += page->told.count;
+        points += mark->count;
     }
     qsort(list, found, sizeof *list, by_gap);
     for (; *count < found && *count < room; ++*count)
@@ -352,15 +445,31 @@ int patina_cloud_get_pages(patina_cloud *cloud, patina_pages_info *info)
 
 // ---- the end -------------------------------------------------------------------------------------------------------
 
+void pt_arrived_free(struct pt_page *page)
+{
+    if (page->arrived)
+        free(page->arrived->chunks);
+    free(page->arrived);
+    page->arrived = NULL;
+}
+
 void pt_paged_destroy(struct patina_cloud *cloud)
 {
     struct pt_paged *paged = cloud->paged;
     if (!paged)
         return;
     for (uint32_t p = 0; p < paged->page_count && paged->pages; p++)
-        free(paged->pages[p].chunks);
+        pt_arrived_free(&paged->pages[p]);
+    pt_pages_free(paged->page_of, (size_t)cloud->chunk_count * sizeof *paged->page_of);
     free(paged->pages);
-    free(paged->page_of);
+    free(paged->marks);
+    free(paged->ways);
+    free(paged->reaches);
+    free(paged->totals);
+    free(paged->beneath);
+    free(paged->over);
+    free(paged->there);
+    free(paged->staged);
     pt_mutex_destroy(&paged->lock);
     free(paged);
 }

@@ -12,15 +12,6 @@
 
 static uint32_t chunks_of(uint32_t count) { return (count + PT_CHUNK_POINTS - 1) / PT_CHUNK_POINTS; }
 
-static uint32_t padded(uint32_t count) { return (count + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN; }
-
-// The i-th chunk of a page, as patina_cloud_create cuts so many points evenly.
-static uint32_t share_of(const struct pt_page *page, uint32_t i)
-{
-    const uint64_t count = page->told.count;
-    return (uint32_t)(count * (i + 1) / page->chunk_count - count * i / page->chunk_count);
-}
-
 // ---- a page arrives ----------------------------------------------------------------------------------------------------
 
 static int bad_page(const struct patina_cloud *cloud, uint32_t index, const char *what)
@@ -42,7 +33,7 @@ static int check_page(const struct patina_cloud *cloud, uint32_t index, const st
     }
     int same = made->chunk_count == page->chunk_count && made->slots == page->slots;
     for (uint32_t i = 0; i < page->chunk_count && same; i++)
-        same = made->chunks[i].padded == cloud->chunks[page->first_chunk + i].padded;
+        same = made->chunks[i].padded == pt_page_padded(page, i);
     return same ? PATINA_OK : pt_fail(&cloud->handle, PATINA_ERROR_INTERNAL, "page %u was cut otherwise than promised", index);
 }
 
@@ -52,7 +43,7 @@ static void copy_page(struct patina_cloud *cloud, struct pt_page *page, const st
     memcpy((float *)cloud->positions + 3 * at, made->positions, 12 * slots);
     memcpy(cloud->surfels + at, made->surfels, 4 * slots);
     for (uint64_t i = 0; i < slots; i++)
-        cloud->order[at + i] = page->first_number + made->order[i];
+        cloud->order[at + i] = (uint32_t)page->first_number + made->order[i];
     if (color)
         memcpy((char *)cloud->colors + color * at, made->colors, color * slots);
     if (cloud->scalars)
@@ -87,25 +78,35 @@ int patina_cloud_page_give(patina_cloud *cloud, uint32_t index, const patina_clo
         return error;
     if ((error = pt_cloud_check_desc(&checked)))
         return pt_fail_again(&cloud->handle, error);
-    struct pt_page *page = &cloud->paged->pages[index];
+    struct pt_paged *paged = cloud->paged;
+    struct pt_page *page = &paged->pages[index];
     int absent = PT_PAGE_ABSENT;
-    if (!atomic_compare_exchange_strong(&page->state, &absent, PT_PAGE_COMING))
+    if (!atomic_compare_exchange_strong(&paged->marks[index].state, &absent, PT_PAGE_COMING))
         return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "page %u is there already", index);
     checked.threads = 1; // pages come side by side
     struct pt_pool *pool = pt_pool_create(checked.threads, 0);
     error = pt_cloud_tell(pt_cloud_build(&checked, PT_BUILD_EVENLY, NULL, pool, NULL, &made), checked.count);
     pt_pool_destroy(pool);
-    error = error ? pt_fail_again(&cloud->handle, error) : check_page(cloud, index, made);
+    struct pt_arrived *arrived = error ? NULL : malloc(sizeof *arrived);
+    error = error      ? pt_fail_again(&cloud->handle, error)
+            : !arrived ? pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "page %u: out of memory", index)
+                       : check_page(cloud, index, made);
     if (!error) {
         copy_page(cloud, page, made);
-        page->info = made->info;
-        page->chunks = made->chunks;
+        *arrived = (struct pt_arrived){.chunks = made->chunks, .info = made->info};
+        page->arrived = arrived;
         made->chunks = NULL;
-        atomic_fetch_add(&cloud->paged->arrived, 1);
-        atomic_fetch_add(&cloud->paged->coming, page->told.count);
+        pt_mutex_lock(&paged->lock);
+        paged->staged[paged->waiting++] = index;
+        atomic_fetch_add(&paged->arrived, 1);
+        atomic_fetch_add(&paged->coming, page->told.count);
+        atomic_store(&paged->marks[index].state, PT_PAGE_STAGED);
+        pt_mutex_unlock(&paged->lock);
+    } else {
+        free(arrived);
+        atomic_store(&paged->marks[index].state, PT_PAGE_ABSENT);
     }
     patina_cloud_destroy(made);
-    atomic_store(&page->state, error ? PT_PAGE_ABSENT : PT_PAGE_STAGED);
     return error;
 }
 
@@ -146,16 +147,14 @@ static void lay_out(struct patina_cloud *cloud, const patina_pages_desc *desc)
         *page = (struct pt_page){.told = desc->pages[p],
                                  .first_chunk = chunk,
                                  .chunk_count = chunks_of(desc->pages[p].count),
-                                 .first_number = (uint32_t)cloud->info.count,
+                                 .first_number = cloud->info.count,
                                  .first_slot = cloud->slots};
-        for (uint32_t i = 0; i < page->chunk_count; i++, chunk++) {
-            cloud->chunks[chunk].first = (uint32_t)cloud->slots;
-            cloud->chunks[chunk].padded = padded(share_of(page, i));
-            cloud->slots += cloud->chunks[chunk].padded;
-            paged->page_of[chunk] = p;
-            pt_page_empty(cloud, page, i);
-        }
-        page->slots = cloud->slots - page->first_slot;
+        for (uint32_t i = 0; i < page->chunk_count; i++)
+            page->slots += pt_page_padded(page, i);
+        paged->marks[p].count = page->told.count;
+        paged->marks[p].parent = page->told.parent;
+        chunk += page->chunk_count;
+        cloud->slots += page->slots;
         cloud->info.count += page->told.count;
         finest = fmin(finest, page->told.gap);
     }
@@ -190,17 +189,26 @@ static int begin(struct patina_cloud *cloud, const patina_pages_desc *desc)
     pt_mutex_init(&paged->lock);
     for (uint32_t p = 0; p < desc->page_count; p++)
         cloud->chunk_count += chunks_of(desc->pages[p].count);
+    paged->whole = cloud;
     paged->page_count = desc->page_count;
     paged->cap = desc->memory_cap;
     paged->pages = calloc(desc->page_count, sizeof *paged->pages);
-    paged->page_of = malloc((cloud->chunk_count + 1u) * sizeof *paged->page_of);
-    cloud->chunks = calloc(cloud->chunk_count + 1u, sizeof *cloud->chunks);
-    if (!paged->pages || !paged->page_of || !cloud->chunks)
+    paged->marks = calloc(desc->page_count, sizeof *paged->marks);
+    paged->ways = malloc(desc->page_count * sizeof *paged->ways);
+    paged->there = calloc(desc->page_count, sizeof *paged->there);
+    paged->staged = malloc(desc->page_count * sizeof *paged->staged);
+    paged->totals = malloc(desc->page_count * sizeof *paged->totals);
+    paged->beneath = malloc(desc->page_count * sizeof *paged->beneath);
+    paged->over = malloc(desc->page_count * sizeof *paged->over);
+    paged->page_of = pt_pages_reserve(cloud->chunk_count * sizeof *paged->page_of);
+    cloud->chunks = pt_pages_reserve(cloud->chunk_count * sizeof *cloud->chunks);
+    paged->table = cloud->chunks ? cloud->chunk_count * sizeof *cloud->chunks : 0;
+    if (!paged->pages || !paged->marks || !paged->ways || !paged->there || !paged->staged || !paged->totals ||
+        !paged->beneath || !paged->over || !paged->page_of || !cloud->chunks)
         return PATINA_ERROR_MEMORY;
     lay_out(cloud, desc);
     cloud->info.chunks = cloud->chunk_count;
-    cloud->info.bytes = cloud->chunk_count * sizeof *cloud->chunks;
-    return take_arrays(cloud);
+    return pt_paged_tree(paged) ? PATINA_ERROR_MEMORY : take_arrays(cloud);
 }
 
 int patina_cloud_pages_begin(const patina_pages_desc *given, patina_cloud **out)

@@ -4,6 +4,7 @@
 
 #include "clip.h"
 #include "mask.h"
+#include "paged.h"
 #include "parts.h"
 #include "scans.h"
 #include "shared/balls.h"
@@ -563,6 +564,26 @@ void pt_mesh_corners(const struct pt_instance *instance, pt_corner_work *work, v
         pt_chunk_corners(&instance->mesh->box, instance->mesh_style.world_from_object, work, context);
 }
 
+void pt_cloud_corners(const struct patina_cloud *cloud, const struct pt_sieve *sieve, const double matrix[16],
+                      pt_corner_work *work, void *context)
+{
+    struct pt_chunk box;
+    pt_paged_enter(cloud, 0);
+    for (uint32_t page = pt_page_first(cloud); page != PATINA_NO_PAGE;) {
+        const int absent = !pt_page_is_there(cloud, page);
+        if (absent) {
+            pt_page_box(cloud, page, &box);
+            if (!sieve || pt_sieve_page(sieve, &box) != PT_CUT_AWAY)
+                pt_chunk_corners(&box, matrix, work, context);
+        }
+        page = pt_page_next(cloud, page, !absent || !pt_page_nests(cloud)); // what lies within a box adds nothing
+    }
+    for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < cloud->chunk_count; c++)
+        if (!sieve || pt_sieve_chunk(sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
+            pt_chunk_corners(&cloud->chunks[c], matrix, work, context);
+    pt_paged_leave(cloud);
+}
+
 // PATINA_ERROR_MEMORY when there is none; without points, nothing is called back.
 int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *context)
 {
@@ -572,9 +593,7 @@ int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *contex
     for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const patina_cloud *cloud = scene->instances[i].cloud;
         struct pt_sieve sieve = pt_sieve_make(scene, &scene->instances[i], PT_EVERY_POINT, room);
-        for (uint32_t c = 0; c < cloud->chunk_count; c++)
-            if (pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
-                pt_chunk_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
+        pt_cloud_corners(cloud, &sieve, scene->instances[i].style.world_from_object, work, context);
     }
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         pt_mesh_corners(pt_mesh_at(scene, i), work, context);
