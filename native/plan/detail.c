@@ -60,6 +60,12 @@ int pt_detail_draws(struct pt_detail *detail, const struct pt_chunk *chunk, doub
     return 1;
 }
 
+void pt_detail_join(struct pt_detail *detail, const struct pt_detail *other)
+{
+    if (other->least > 0.0)
+        detail->least = detail->least > 0.0 ? pt_least(detail->least, other->least) : other->least;
+}
+
 double pt_detail_thinning(const struct pt_detail *detail)
 {
     return detail->least > 0.0 ? pt_most(detail->least / detail->finest, 1.0) : 1.0;

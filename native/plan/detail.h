@@ -22,6 +22,9 @@ int pt_detail_draws(struct pt_detail *detail, const struct pt_chunk *chunk, doub
 // Whether none of a cluster of chunks is drawn, of which none has a greater gap; its pixel is no wider than theirs.
 int pt_detail_leaves_out(const struct pt_detail *detail, double gap, double pixel);
 
+// What another part of the cloud drew.
+void pt_detail_join(struct pt_detail *detail, const struct pt_detail *other);
+
 // How much farther apart than all of the cloud's lie what is drawn of it anywhere: by this much its footprints are widened.
 double pt_detail_thinning(const struct pt_detail *detail);
 

@@ -103,7 +103,8 @@ struct survey {
     uint32_t *seen_count;
     int points, discs;   // some chunk's points are drawn as such
     struct cells *cells; // per instance
-    double *thinned;     // per instance: how much farther apart than its cloud's the points that are drawn lie
+    struct pt_detail *details;
+    double *thinned; // per instance: how much farther apart than its cloud's the points that are drawn lie
 };
 
 static int is_transparent(const struct pt_instance *instance)
@@ -153,13 +154,13 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     const int ranges = pt_draws_ranges(scene, plan, instance), discs = pt_knows_discs(scene, plan, instance);
     const enum pt_kind kind = ranges ? PT_AS_RANGES : discs ? PT_AS_DISCS : PT_AS_POINTS; // that reaches farthest
     const struct pt_to_place what = {scene, instance, object};
-    struct pt_detail detail;
-    pt_detail_begin(scene, plan, instance, &detail);
-    const double apart = pt_thinning(scene), wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
+    struct pt_detail *detail = &survey->details[i];
+    pt_detail_begin(scene, plan, instance, detail);
+    const double wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
     double rows[9];
     pt_object_rows(camera, object, rows);
     const struct pt_cluster *clusters = pt_sieves(&survey->sieves[i]) ? NULL : cloud->clusters; // what clips take is counted
-    const struct pt_looking looking = {camera, kind, &what, rows, &survey->sieves[i], &detail};
+    const struct pt_looking looking = {camera, kind, &what, rows, &survey->sieves[i], detail};
     const uint32_t end = instance->style.transparency < 1.0f && !pt_all_soft(instance) ? cloud->chunk_count : 0;
     plan->chunks_clipped += end ? pt_plan_absent(&looking) : 0;
     for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < end; c++) {
@@ -186,7 +187,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         const double pixel = pt_most(camera->xs, camera->ys), middle = seen.extent.z_middle;
         const double before = camera->orthographic ? 1.0 : pt_most(seen.extent.z_before, 0.0);
         double left_out, rim;
-        if (!pt_detail_draws(&detail, chunk, pixel * before / object->scale, &left_out))
+        if (!pt_detail_draws(detail, chunk, pixel * before / object->scale, &left_out))
             continue;
         pt_paged_look(cloud, c);
         const double stretch = stretch_of(camera, &seen.extent, &rim);
@@ -215,7 +216,6 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         survey->discs |= seen.wide && !ranges;
         list[survey->seen_count[i]++] = seen;
     }
-    survey->thinned[i] = apart * pt_detail_thinning(&detail);
     plan->transparent |= transparent && survey->seen_count[i] > 0;
     return PATINA_OK;
 }
@@ -482,16 +482,15 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
     plan->mesh.triangles += mesh->info.triangle_count;
 }
 
-// Points of a cloud's parts lie as far apart as of the part whose points lie closest: as of the whole.
-static void join_parts(const struct patina_scene *scene, struct survey *survey)
+// Parts of a cloud are thinned out as the whole would be.
+static void thin_out(const struct patina_scene *scene, struct survey *survey)
 {
     for (uint32_t i = 0, end; i < scene->cloud_count; i = end) {
-        double least = INFINITY;
-        for (end = i; end < scene->cloud_count && pt_same_cloud(scene, i, end); end++)
-            if (survey->seen_count[end] && survey->thinned[end] < least)
-                least = survey->thinned[end];
-        for (uint32_t k = i; k < end && end - i > 1 && least < INFINITY; k++)
-            survey->thinned[k] = least;
+        struct pt_detail detail = survey->details[i];
+        for (end = i + 1; end < scene->cloud_count && pt_same_cloud(scene, i, end); end++)
+            pt_detail_join(&detail, &survey->details[end]);
+        for (uint32_t part = i; part < end; part++)
+            survey->thinned[part] = pt_thinning(scene) * pt_detail_thinning(&detail);
     }
 }
 
@@ -504,17 +503,19 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     survey->seen_count = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->seen_count);
     survey->sieves = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->sieves);
     survey->thinned = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->thinned);
-    if (!survey->thinned || !survey->sieves || !survey->objects || !survey->seen || !survey->seen_count)
+    survey->details = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->details);
+    if (!survey->details || !survey->thinned || !survey->sieves || !survey->objects || !survey->seen || !survey->seen_count)
         return PATINA_ERROR_MEMORY;
     int error = pt_eye_of(scene, &survey->camera);
     const struct pt_eye bare = survey->camera;
     pt_pad_eye(&survey->camera, AROUND);
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
         error = look_at_instance(scene, plan, survey, i);
+    if (!error)
+        thin_out(scene, survey);
     for (uint32_t i = 0; i < scene->mesh_count && !plan->map; i++)
         plan->transparent |= pt_mesh_at(scene, i)->mesh_style.alpha == PATINA_ALPHA_BLEND &&
                              pt_mesh_drawn(pt_mesh_at(scene, i)->mesh);
-    join_parts(scene, survey);
     survey->camera = bare;
     struct pt_spread spread = {.middle = plan->spacing_middle, .most = plan->spacing_px};
     if (!error)

@@ -6,7 +6,6 @@
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "fingerprint.h"
-#include "parts.h"
 #include "shared/view.h"
 #include "shared/words.h"
 
@@ -51,21 +50,6 @@ static void densities(struct pt_paged *paged)
         over[p] = above == PATINA_NO_PAGE ? 0.0 : over[above] + (area > 0.0 ? paged->marks[above].count / area : 0.0);
         beneath[p] = (paged->totals[p] - beneath[p]) / paged->marks[p].count; // times what its own points come to
     }
-}
-
-// The part that a page's chunks are of.
-static const struct patina_cloud *part_of(const struct pt_paged *paged, const struct pt_page *page)
-{
-    const struct patina_cloud *whole = paged->whole;
-    uint32_t low = 0, high = pt_part_count(whole);
-    while (high - low > 1) {
-        const uint32_t middle = low + (high - low) / 2;
-        if (pt_part(whole, middle)->first_chunk <= page->first_chunk)
-            low = middle;
-        else
-            high = middle;
-    }
-    return pt_part(whole, low);
 }
 
 // The page's chunks: spacings of all that is there, and their classes in the words of the points. Whether any changed.
@@ -113,26 +97,6 @@ static void settle_spacings(struct patina_cloud *cloud)
     free(known);
 }
 
-// What parts have of their own stays.
-static void tell_parts(struct patina_cloud *whole)
-{
-    const struct pt_paged *paged = whole->paged;
-    for (uint32_t i = 0; i < whole->part_count; i++) {
-        struct patina_cloud *part = &whole->parts[i];
-        part->info = whole->info;
-        part->info.chunks = part->chunk_count;
-        part->info.drawn = 0;
-        part->built = whole->built;
-        part->class_hash = whole->class_hash;
-        atomic_store(&part->alive->fingerprint, 0);
-        atomic_fetch_add(&part->alive->pages, 1);
-    }
-    for (uint32_t i = 0; i < paged->present && whole->part_count; i++) {
-        const struct pt_page *page = &paged->pages[paged->there[i]];
-        whole->parts[part_of(paged, page) - whole->parts].info.drawn += page->told.count;
-    }
-}
-
 static void sum_up(struct patina_cloud *cloud)
 {
     struct pt_paged *paged = cloud->paged;
@@ -160,7 +124,7 @@ static void sum_up(struct patina_cloud *cloud)
                                            : pt_fingerprint(cloud->class_hash, &paged->points, sizeof paged->points);
     atomic_store(&cloud->alive->fingerprint, 0);
     atomic_fetch_add(&cloud->alive->pages, 1);
-    tell_parts(cloud);
+    pt_paged_tell_parts(paged);
 }
 
 static void count_below(struct pt_paged *paged, uint32_t p, uint32_t by)
@@ -265,7 +229,7 @@ static void publish(struct patina_cloud *cloud, uint32_t p)
 {
     struct pt_paged *paged = cloud->paged;
     struct pt_page *page = &paged->pages[p];
-    uint64_t first = page->first_slot - part_of(paged, page)->first_slot;
+    uint64_t first = page->first_slot - pt_page_part(paged, page)->first_slot;
     double area = 0.0;
     for (uint32_t i = 0; i < page->chunk_count; i++) {
         struct pt_chunk *chunk = &cloud->chunks[page->first_chunk + i];
@@ -343,6 +307,10 @@ void pt_paged_leave(const struct patina_cloud *cloud)
 
 int pt_paged_refuse(const struct patina_cloud *cloud, const char *call)
 {
+    if (cloud->paged && cloud->part_count)
+        return pt_fail(&cloud->handle, PATINA_ERROR_TOO_MANY_POINTS,
+                       "%s: does not take a cloud in pages of more than 2147483647 points yet, and these are %llu", call,
+                       (unsigned long long)cloud->info.count);
     if (!pt_paged_absent(cloud))
         return PATINA_OK;
     return pt_fail(&cloud->handle, PATINA_ERROR_UNSUPPORTED, "%s: points of the cloud are still on their way", call);

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static uint32_t chunks_of(uint32_t count) { return (count + PT_CHUNK_POINTS - 1) / PT_CHUNK_POINTS; }
+static uint32_t chunks_of(uint32_t count) { return count / PT_CHUNK_POINTS + (count % PT_CHUNK_POINTS != 0); }
 
 // ---- a page arrives ----------------------------------------------------------------------------------------------------
 
@@ -42,8 +42,9 @@ static void copy_page(struct patina_cloud *cloud, struct pt_page *page, const st
     const uint64_t at = page->first_slot, slots = page->slots, color = pt_color_size(cloud->color_format);
     memcpy((float *)cloud->positions + 3 * at, made->positions, 12 * slots);
     memcpy(cloud->surfels + at, made->surfels, 4 * slots);
+    const uint32_t number = pt_page_number(cloud->paged, page);
     for (uint64_t i = 0; i < slots; i++)
-        cloud->order[at + i] = (uint32_t)page->first_number + made->order[i];
+        cloud->order[at + i] = number + made->order[i];
     if (color)
         memcpy((char *)cloud->colors + color * at, made->colors, color * slots);
     if (cloud->scalars)
@@ -114,7 +115,7 @@ int patina_cloud_page_give(patina_cloud *cloud, uint32_t index, const patina_clo
 
 static int check_pages(const patina_pages_desc *desc)
 {
-    uint64_t points = 0, slots = 0;
+    uint64_t points = 0, slots = 0, chunks = 0;
     if (!desc->page_count || !desc->pages)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_pages_begin: no pages");
     const uint32_t colors = 1u << PATINA_NONE | 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32;
@@ -128,13 +129,20 @@ static int check_pages(const patina_pages_desc *desc)
             good &= isfinite(page->box_min[k]) && isfinite(page->box_max[k]) && page->box_min[k] <= page->box_max[k];
         if (!good)
             return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "page %u: no points, no box, no gap, or a parent behind it", p);
+        if (page->count + (uint64_t)(PT_CHUNK_ALIGN - 1) * chunks_of(page->count) >
+            0x7FFFFFFF) // of a part: gathers take signed indices
+            return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "page %u has %u points: at most 2147483647 fit into one", p,
+                           page->count);
         points += page->count;
         slots += page->count + (uint64_t)(PT_CHUNK_ALIGN - 1) * chunks_of(page->count);
+        chunks += chunks_of(page->count);
     }
-    if (slots > 0x7FFFFFFF) // gathers take signed indices
+    if (slots > 0x7FFFFFFF) // scenes do not take parts yet
         return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "a cloud of %llu points: at most 2147483647 fit, split it",
                        (unsigned long long)points);
-    return PATINA_OK;
+    return chunks < UINT32_MAX ? PATINA_OK
+                               : pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%llu chunks of points: at most 4294967294 fit",
+                                         (unsigned long long)chunks);
 }
 
 static void lay_out(struct patina_cloud *cloud, const patina_pages_desc *desc)
@@ -208,7 +216,7 @@ static int begin(struct patina_cloud *cloud, const patina_pages_desc *desc)
         return PATINA_ERROR_MEMORY;
     lay_out(cloud, desc);
     cloud->info.chunks = cloud->chunk_count;
-    return pt_paged_tree(paged) ? PATINA_ERROR_MEMORY : take_arrays(cloud);
+    return pt_paged_tree(paged) || take_arrays(cloud) ? PATINA_ERROR_MEMORY : pt_paged_parts(cloud);
 }
 
 int patina_cloud_pages_begin(const patina_pages_desc *given, patina_cloud **out)

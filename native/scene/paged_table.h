@@ -67,6 +67,13 @@ struct pt_paged {
     _Atomic uint64_t coming; // points of staged pages
 };
 
+// Parts, once pages and arrays stand; where all fit, there are none. 0 or PATINA_ERROR_MEMORY.
+int pt_paged_parts(struct patina_cloud *cloud);
+// The one that a page is of, or the whole.
+struct patina_cloud *pt_page_part(const struct pt_paged *paged, const struct pt_page *page);
+uint32_t pt_page_number(const struct pt_paged *paged, const struct pt_page *page); // of its first point, as order has it
+void pt_paged_tell_parts(struct pt_paged *paged); // what the whole knows, whenever that changed
+
 // The ways over the tree, once pages stand. 0 or PATINA_ERROR_MEMORY.
 int pt_paged_tree(struct pt_paged *paged);
 

@@ -2,6 +2,7 @@
 // Clouds whose points arrive page by page (SPEC 14): whatever the order, the same picture in the end, as of the saved file; before, what
 // has arrived; lists of what is wanted; pages that are not what was promised.
 #include "clouds.h"
+#include "scene/parts.h"
 #include "support.h"
 
 #include <math.h>
@@ -126,7 +127,8 @@ static patina_scene *stage_of(patina_cloud *cloud, int near_by, uint32_t lights,
     patina_cloud_style style = PATINA_CLOUD_STYLE_INIT;
     style.lighting = lights ? PATINA_LIGHTING_LIT : PATINA_LIGHTING_AUTO;
     CHECK(patina_scene_create(&scene), NULL);
-    CHECK(patina_scene_add_cloud(scene, cloud, &style), scene);
+    for (uint32_t i = 0; i < pt_part_count(cloud); i++)
+        CHECK(patina_scene_add_cloud(scene, pt_part(cloud, i), &style), scene);
     const patina_light_desc light = {
         .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 2, .direction = {-1, 0.5, -2}, .shadows = 1};
     if (lights)
@@ -412,11 +414,101 @@ static void test_cap(void **state)
     free_tree(tree);
 }
 
+// ---- clouds in parts ---------------------------------------------------------------------------------------------------
+
+static void set_variable(const char *name, const char *value)
+{
+#ifdef _WIN32
+    _putenv_s(name, value ? value : "");
+#else
+    if (value)
+        setenv(name, value, 1);
+    else
+        unsetenv(name);
+#endif
+}
+
+static patina_cloud *begin_in_parts(const struct tree *tree, uint64_t cap)
+{
+    set_variable("PATINA_PART_SLOTS", "20000");
+    patina_cloud *cloud = begin(tree, cap);
+    set_variable("PATINA_PART_SLOTS", NULL);
+    assert_true(cloud->part_count > 4);
+    return cloud;
+}
+
+// Instances' points are numbered one behind the other: of parts of one cloud this number is wanted.
+static void number_anew(struct picture *picture)
+{
+    for (int i = 0; i < WIDTH * HEIGHT; i++)
+        if (picture->keys[i] != KEY_EMPTY)
+            picture->keys[i] -= key_id(picture->keys[i]) - key_id(picture->keys[i]) % POINTS;
+}
+
+// Whatever the order of the pages, before all are there and after, and under a cap that gives some back: what is wanted, and the bytes of the
+// picture, are those of the cloud in one piece.
+static void in_parts(patina_device *device, const char *name)
+{
+    static const struct {
+        const char *name;
+        int near_by;
+        uint32_t lights, surface;
+        float detail;
+        uint64_t cap;
+    } looks[] = {{"far", 0, 0, 0, 0.0f, 0},
+                 {"near, as the viewport", 1, 0, 0, 8.0f, 0},
+                 {"shadows", 0, 1, 0, 0.0f, 0},
+                 {"discs in shadows", 1, 1, PATINA_SURFACE_SPLATS, 0.0f, 0},
+                 {"under a cap", 1, 0, 0, 0.0f, 16 * POINTS}};
+    struct tree *tree = make_tree();
+    for (size_t l = 0; l < sizeof looks / sizeof *looks; l++) {
+        patina_settings settings = settings_default(WIDTH, HEIGHT);
+        settings.surface = looks[l].surface;
+        settings.detail = looks[l].detail;
+        patina_cloud *clouds[2] = {begin(tree, looks[l].cap), begin_in_parts(tree, looks[l].cap)};
+        for (uint32_t turn = 0; turn < 5; turn++) {
+            struct picture pictures[2];
+            uint32_t wanted[2][PAGES], count[2];
+            const int near_by = looks[l].near_by ^ (looks[l].cap && turn == 2);
+            for (int k = 0; k < 2; k++) {
+                pictures[k] = draw(device, clouds[k], near_by, looks[l].lights, &settings);
+                CHECK(patina_cloud_wanted(clouds[k], 0.0, wanted[k], PAGES, &count[k]), clouds[k]);
+            }
+            assert_int_equal(count[0], count[1]);
+            assert_memory_equal(wanted[0], wanted[1], count[0] * sizeof **wanted);
+            number_anew(&pictures[1]);
+            picture_assert_identical(&pictures[1], &pictures[0], 0, 0, looks[l].name);
+            assert_true(!turn || picture_count(&pictures[0]) > WIDTH * HEIGHT / 20);
+            picture_free(&pictures[0]);
+            picture_free(&pictures[1]);
+            const patina_pages_info one = told(clouds[0]), parts = told(clouds[1]);
+            assert_true(one.arrived == parts.arrived && one.returned == parts.returned && one.wanted == parts.wanted);
+            for (int k = 0; k < 2; k++) // a third of them, then all, in the one's order and in the other's
+                for (uint32_t i = 0, n = turn < 2 ? (count[k] + 2) / 3 : count[k]; i < n; i++)
+                    give(clouds[k], tree, wanted[k][k ? n - 1 - i : i]);
+        }
+        const patina_pages_info info = told(clouds[1]);
+        assert_true(looks[l].cap ? info.returned > 0 : looks[l].near_by || info.pages_arrived == tree->count);
+        printf("  %s, %s: %u parts, %u of %u pages, %u given back\n", name, looks[l].name, clouds[1]->part_count,
+               info.pages_arrived, info.pages, info.returned);
+        patina_cloud_destroy(clouds[0]);
+        patina_cloud_destroy(clouds[1]);
+    }
+    free_tree(tree);
+}
+
+static void test_in_parts(void **state)
+{
+    (void)state;
+    support_each_device(in_parts);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_beside_flat),
                                        cmocka_unit_test(test_partial),    cmocka_unit_test(test_wanted),
-                                       cmocka_unit_test(test_damaged),    cmocka_unit_test(test_cap)};
+                                       cmocka_unit_test(test_damaged),    cmocka_unit_test(test_cap),
+                                       cmocka_unit_test(test_in_parts)};
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
