@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Clouds in parts (parts.h): small ones, which PATINA_PART_SLOTS divides, are in all that is asked of them what they are undivided; tables
 // of chunks, and builders, whose counts are beyond 2^31 and 2^32; calls that take no such cloud say so.
+#include "base/platform.h"
 #include "scene/builder.h"
 #include "scene/page_sums.h"
 #include "scene/parts.h"
@@ -416,6 +417,35 @@ static void test_table(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// A file of a terabyte, all holes, is mapped on any machine that promises more than it has.
+static void test_larger_than_memory(void **state)
+{
+    (void)state;
+#ifdef _WIN32
+    print_message("skip: Windows counts what is mapped so as memory\n");
+#else
+    FILE *stream = fopen(at("found"), "wb");
+    assert_non_null(stream);
+    const int made = !ftruncate(fileno(stream), (off_t)1 << 40);
+    fclose(stream);
+    FILE *rule = fopen("/proc/sys/vm/overcommit_memory", "r");
+    const int strict = rule && fgetc(rule) == '2';
+    if (rule)
+        fclose(rule);
+    if (!made || strict) {
+        print_message("skip: %s\n", made ? "this system promises no more memory than it has" : "no file here may be so large");
+        return;
+    }
+    struct pt_disk disk;
+    void *data = NULL;
+    assert_int_equal(pt_disk_open(at("found"), &disk), 0);
+    assert_int_equal(pt_disk_map(&disk, 0, (size_t)1 << 40, PT_DISK_ANYWHERE, &data), 0);
+    assert_true(!((const char *)data)[0] && !((const char *)data)[((size_t)1 << 40) - 1]);
+    pt_pages_free(data, (size_t)1 << 40);
+    pt_disk_close(&disk);
+#endif
+}
+
 // As if `before` points had come already, that were nowhere.
 static patina_cloud *build(uint64_t before, uint64_t count, const patina_cloud_desc *desc)
 {
@@ -471,9 +501,10 @@ static void test_built(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_open),   cmocka_unit_test(test_saved),   cmocka_unit_test(test_values),
-        cmocka_unit_test(test_damage), cmocka_unit_test(test_refused), cmocka_unit_test(test_table),
-        cmocka_unit_test(test_built),
+        cmocka_unit_test(test_open),    cmocka_unit_test(test_saved),
+        cmocka_unit_test(test_values),  cmocka_unit_test(test_damage),
+        cmocka_unit_test(test_refused), cmocka_unit_test(test_table),
+        cmocka_unit_test(test_built),   cmocka_unit_test(test_larger_than_memory),
     };
     return cmocka_run_group_tests(tests, make_files, remove_files);
 }
