@@ -16,7 +16,6 @@ from source import Source, SourceError
 
 MOST_NODES = 1 << 23
 MOST_POINTS = 1 << 24  # of a node: more is no octree
-MOST_SLOTS = (1 << 31) - 1  # of a cloud of the library's, whose pages are chunks of 4096 points, each filled up to a multiple of 16
 _INFO = 160  # bytes of its record
 ENTRY = np.dtype([("key", "<i4", 4), ("offset", "<u8"), ("size", "<i4"), ("count", "<i4")])
 
@@ -40,7 +39,6 @@ class Tree:
     laszip: bytes
     wkt: str
     nodes: np.ndarray  # of ENTRY
-    left_out: str  # which of the file's are not among them, and why
     parents: np.ndarray  # (n,) int64; -1: none
     cubes: np.ndarray  # (n, 6) float64, relative to the origin
     gaps: np.ndarray  # (n,) float64
@@ -75,11 +73,11 @@ def read_tree(source: Source) -> Tree:
     if more < 0 or header_size != 375 or data_offset > 1 << 28:
         raise SourceError("its head is damaged: records are too short, or the points lie nowhere")
     laszip, wkt = _records(source, data_offset, records)
-    nodes, left_out = coarser(_hierarchy(source, root, root_size))
+    nodes = _hierarchy(source, root, root_size)
     parents, cubes, gaps = arrange(nodes, np.array(center_half_gap[:3]), center_half_gap[3], center_half_gap[4])
     origin = origin_of(lower, upper, float(scale.min()))
     grown = np.tile(np.array([-1, 1])[:, None] * scale, 1).reshape(1, 6)  # points are rounded to the scale
-    return Tree(np.dtype(fields + [("more", f"V{more}")] * bool(more)), scale, offset, lower, upper, origin, laszip, wkt, nodes, left_out,
+    return Tree(np.dtype(fields + [("more", f"V{more}")] * bool(more)), scale, offset, lower, upper, origin, laszip, wkt, nodes,
                 parents, cubes - np.tile(origin, 2) + grown, gaps)
 
 
@@ -130,20 +128,6 @@ def _hierarchy(source: Source, root: int, root_size: int) -> np.ndarray:
 def in_order(nodes: np.ndarray) -> np.ndarray:
     """By depth first."""
     return nodes[np.lexsort([nodes["key"][:, k] for k in (3, 2, 1, 0)])]
-
-
-def coarser(nodes: np.ndarray) -> tuple[np.ndarray, str]:
-    """Those of nodes, by depth, that one cloud holds: whole depths, so that points lie as densely everywhere; and a sentence on the others."""
-    counts, depths = nodes["count"].astype(np.int64), nodes["key"][:, 0]
-    fit = np.cumsum(counts + 15 * (-(-counts // 4096))) <= MOST_SLOTS
-    if fit.all():
-        return nodes, ""
-    few = depths < depths[np.argmin(fit)]
-    held, points = int(counts[few].sum()), int(counts.sum())
-    if not held:
-        raise SourceError(f"its coarsest level alone has {int(counts[depths == depths[0]].sum()):,} points: a cloud holds {MOST_SLOTS:,}")
-    return nodes[few], (f"{held:,} of {points:,} points are read, the {len(np.unique(depths[few]))} coarser of {len(np.unique(depths))} levels of its octree: "
-                        f"a cloud holds {MOST_SLOTS:,}")
 
 
 def arrange(nodes: np.ndarray, center: np.ndarray, half: float, gap: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -50,7 +50,6 @@ class Tree:
     origin: np.ndarray
     wkt: str
     nodes: np.ndarray  # of copc.ENTRY; no offsets, and sizes are guesses
-    left_out: str
     parents: np.ndarray
     cubes: np.ndarray
     gaps: np.ndarray
@@ -91,12 +90,12 @@ def read_tree(source: Source) -> Tree:
     if not sides.min() > 0 or sides.max() > sides.min() * (1 + 1e-6) or (tight[3:] < tight[:3]).any():
         raise SourceError(f"{name} is damaged: its bounds are no cube")
     lower, upper = tight[:3], tight[3:]
-    nodes, left_out = copc.coarser(_hierarchy(source, zipped))
+    nodes = _hierarchy(source, zipped)
     parents, cubes, gaps = copc.arrange(nodes, 0.5 * (bounds[:3] + bounds[3:]), 0.5 * float(sides[0]), float(sides[0]) / span)
     origin = copc.origin_of(lower, upper, float(scale.min()))
     grown = np.tile(np.array([-1, 1])[:, None] * scale, 1).reshape(1, 6)  # points are rounded to the scale
     return Tree(packed, record if packed == "binary" else None, scale, offset, lower, upper, origin, wkt if isinstance(wkt, str) else "", nodes,
-                left_out, parents, cubes - np.tile(origin, 2) + grown, gaps)
+                parents, cubes - np.tile(origin, 2) + grown, gaps)
 
 
 def _json(name: str, data: bytes) -> dict:

@@ -49,8 +49,6 @@ class Reader:
         self._done: set[int] = set()
         self._failures = 0
         self._change = threading.Condition()
-        if self._tree.left_out:
-            self._note(self._tree.left_out)
         self._tell_tree()
         for _ in range(wanted.get("workers", 2)):
             threading.Thread(target=self._work, daemon=True).start()

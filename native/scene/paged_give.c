@@ -115,7 +115,7 @@ int patina_cloud_page_give(patina_cloud *cloud, uint32_t index, const patina_clo
 
 static int check_pages(const patina_pages_desc *desc)
 {
-    uint64_t points = 0, slots = 0, chunks = 0;
+    uint64_t chunks = 0;
     if (!desc->page_count || !desc->pages)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_pages_begin: no pages");
     const uint32_t colors = 1u << PATINA_NONE | 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32;
@@ -133,13 +133,8 @@ static int check_pages(const patina_pages_desc *desc)
             0x7FFFFFFF) // of a part: gathers take signed indices
             return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "page %u has %u points: at most 2147483647 fit into one", p,
                            page->count);
-        points += page->count;
-        slots += page->count + (uint64_t)(PT_CHUNK_ALIGN - 1) * chunks_of(page->count);
         chunks += chunks_of(page->count);
     }
-    if (slots > 0x7FFFFFFF) // scenes do not take parts yet
-        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "a cloud of %llu points: at most 2147483647 fit, split it",
-                       (unsigned long long)points);
     return chunks < UINT32_MAX ? PATINA_OK
                                : pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%llu chunks of points: at most 4294967294 fit",
                                          (unsigned long long)chunks);

@@ -47,8 +47,8 @@ typedef struct patina_pages_info {
     uint32_t returned; // how often a page was given back
 } patina_pages_info;
 
-// Makes the cloud, of at most 2^31 - 1 points; memory is taken as they arrive. Points' numbers are those of their pages one behind the
-// other, whichever arrives first.
+// Makes the cloud, of however many points, of which a page has at most 2^31 - 1; memory is taken as they arrive (Windows: is promised for all).
+// Points' numbers are those of their pages one behind the other, whichever arrives first.
 PATINA_API int patina_cloud_pages_begin(const patina_pages_desc *desc, patina_cloud **out);
 // Hands a page's points in. Any thread, at any time, several at once, while pictures of the cloud are drawn too: the next picture of it
 // that begins while no other is drawn has them. PATINA_ERROR_FORMAT, and the page stays absent, where it is not what was promised: other
@@ -63,7 +63,8 @@ PATINA_API int patina_cloud_get_pages(patina_cloud *cloud, patina_pages_info *in
 // A task of patina_cloud_page_give.
 PATINA_API int patina_task_give_page(patina_cloud *cloud, uint32_t page, const patina_cloud_desc *desc, patina_task **out);
 // What a picture of the scene would want is found without drawing it: by patina_frame_plan_text; shadows want more as they are drawn.
-// While pages are absent, colours and scalars are not replaced and nothing is analysed or saved: PATINA_ERROR_UNSUPPORTED. Once all are
+// While pages are absent, colours and scalars are not replaced and nothing is analysed or saved: PATINA_ERROR_UNSUPPORTED; nor ever of more
+// than 2^31 - 1 points: PATINA_ERROR_TOO_MANY_POINTS. Once all are
 // there patina_cloud_save writes a cloud that patina_cloud_open maps, and that draws the same bytes.
 
 #ifdef __cplusplus
