@@ -131,7 +131,8 @@ int pt_is_as_it_lies(const struct patina_cloud *cloud); // whether its order say
 // looked through, leads beyond no array.
 static inline uint64_t pt_number_of(const struct patina_cloud *cloud, uint64_t slot)
 {
-    const uint64_t number = cloud->order ? cloud->order[slot] : pt_place_of(cloud, slot), last = cloud->info.count - 1;
+    const uint64_t before = cloud->info.count > UINT32_MAX ? cloud->first_number : 0; // of pages, whose order tells no more
+    const uint64_t number = cloud->order ? before + cloud->order[slot] : pt_place_of(cloud, slot), last = cloud->info.count - 1;
     return number < last ? number : last;
 }
 

@@ -42,17 +42,17 @@ static int make_part(const struct patina_cloud *whole, const struct pt_page *fir
 int pt_paged_parts(struct patina_cloud *cloud)
 {
     const struct pt_paged *paged = cloud->paged;
-    const uint64_t most = pt_part_slots();
+    const uint64_t each = pt_part_share(pt_part_slots());
     uint32_t count = 0;
-    if (cloud->slots <= most)
+    if (cloud->slots <= pt_part_slots())
         return PATINA_OK;
-    for (uint32_t p = 0; p < paged->page_count; p += fitting(paged, p, most))
+    for (uint32_t p = 0; p < paged->page_count; p += fitting(paged, p, each))
         count++;
     cloud->parts = calloc(count, sizeof *cloud->parts);
     if (!cloud->parts)
         return PATINA_ERROR_MEMORY;
     for (uint32_t p = 0; p < paged->page_count;) {
-        const uint32_t pages = fitting(paged, p, most);
+        const uint32_t pages = fitting(paged, p, each);
         struct patina_cloud *part = &cloud->parts[cloud->part_count];
         const int error = make_part(cloud, &paged->pages[p], &paged->pages[p + pages - 1], part);
         cloud->part_count++;

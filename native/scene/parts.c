@@ -71,14 +71,15 @@ int pt_parts_make(struct patina_cloud *cloud, uint64_t most)
 {
     if (cloud->slots <= most)
         return PATINA_OK;
+    const uint64_t each = pt_part_share(most);
     uint32_t count = 0;
-    for (uint32_t c = 0; c < cloud->chunk_count; c += fitting(cloud, c, most))
+    for (uint32_t c = 0; c < cloud->chunk_count; c += fitting(cloud, c, each))
         count++;
     struct patina_cloud *parts = calloc(count, sizeof *parts);
     if (!parts)
         return PATINA_ERROR_MEMORY;
     for (uint32_t c = 0; cloud->part_count < count; cloud->part_count++) {
-        const uint32_t i = cloud->part_count, chunks = fitting(cloud, c, most);
+        const uint32_t i = cloud->part_count, chunks = fitting(cloud, c, each);
         const int error = make_part(cloud, c, chunks, i ? &parts[i - 1] : NULL, &parts[i]);
         if (error) {
             cloud->parts = parts;
