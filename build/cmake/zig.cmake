@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What the presets windows-*, macos-* and linux-arm64-zig share: clang with the headers and libraries of every system (PyPI's ziglang).
+# What the presets windows-*, macos-* and linux-arm64 share: clang with the headers and libraries of every system (PyPI's ziglang).
 # PATINA_TARGET: as zig names it.
 set(CMAKE_TRY_COMPILE_PLATFORM_VARIABLES PATINA_TARGET)
 set(triple ${PATINA_TARGET})
