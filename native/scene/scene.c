@@ -213,14 +213,11 @@ static int copy_ramp(patina_cloud_style *style)
     return copy ? PATINA_OK : PATINA_ERROR_MEMORY;
 }
 
-// What is of a cloud's slots is not divided as a cloud in parts is; nor are the sums of what is drawn as range images.
+// Sums of what is drawn as range images, and maps of faint points, are not those of all parts together. What is of a cloud's slots (masks,
+// fields, ...) no cloud in parts has.
 static int check_parts(const patina_scene *scene, const patina_cloud_style *style, const patina_cloud *cloud)
 {
-    const char *lacks = style->mask                               ? "a mask"
-                        : style->grade                            ? "a grade"
-                        : style->field                            ? "a field"
-                        : style->scans                            ? "scans"
-                        : style->surface == PATINA_SURFACE_RANGES ? "range images"
+    const char *lacks = style->surface == PATINA_SURFACE_RANGES ? "range images"
                         : cloud->info.has_opacities && !(style->shadow_off & PATINA_SHADOW_NO_CAST)
                             ? "shadows of points that have opacities of their own"
                             : NULL;

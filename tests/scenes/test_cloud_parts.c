@@ -133,8 +133,10 @@ static void check_kind(patina_device *device, const char *name, enum kind kind)
 
 static void each_kind(patina_device *device, const char *name)
 {
+    const int slow = !strncmp(name, "gl", 2); // its plans are the same: a kind of each sort
     for (int kind = 0; kind < KINDS; kind++)
-        check_kind(device, name, (enum kind)kind);
+        if (!slow || kind == FILLED || kind == DISCS || kind == SOFT)
+            check_kind(device, name, (enum kind)kind);
 }
 
 static void test_parts_are_one_cloud(void **state)
@@ -149,15 +151,9 @@ static void test_refusals(void **state)
     (void)state;
     struct points points = points_torus(TORUS, 1.0, 0.4, POINTS_ALL, 5);
     patina_cloud *cloud = make(&points, FILLED, 1);
-    patina_mask *mask = NULL;
-    uint8_t bits[BYTES] = {0};
     patina_scene *scene = NULL;
     CHECK(patina_scene_create(&scene), NULL);
-    CHECK(patina_mask_create(cloud, bits, NULL, BYTES, &mask), cloud);
-    const patina_cloud_style masked = {.struct_size = sizeof masked, .mask = mask},
-                             imaged = {.struct_size = sizeof imaged, .surface = PATINA_SURFACE_RANGES};
-    assert_int_equal(patina_scene_add_cloud(scene, cloud, &masked), PATINA_ERROR_UNSUPPORTED);
-    assert_non_null(strstr(support_message(scene), "a mask"));
+    const patina_cloud_style imaged = {.struct_size = sizeof imaged, .surface = PATINA_SURFACE_RANGES};
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &imaged), PATINA_ERROR_UNSUPPORTED);
     assert_non_null(strstr(support_message(scene), "range images"));
     CHECK(patina_scene_add_cloud(scene, cloud, NULL), scene);
@@ -179,7 +175,6 @@ static void test_refusals(void **state)
     patina_frame_destroy(frame);
     patina_device_destroy(device);
     patina_scene_destroy(scene);
-    patina_mask_destroy(mask);
     patina_cloud_destroy(cloud);
     points_free(&points);
 }

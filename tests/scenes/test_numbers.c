@@ -212,8 +212,10 @@ static void check_kind(patina_device *device, const char *name, enum kind kind)
 
 static void each_kind(patina_device *device, const char *name)
 {
+    const int slow = !strncmp(name, "gl", 2); // its plans are the same: a kind of each sort
     for (int kind = 0; kind < KINDS; kind++)
-        check_kind(device, name, (enum kind)kind);
+        if (!slow || kind == FILLED || kind == DISCS || kind == RANGES || kind == SOFT)
+            check_kind(device, name, (enum kind)kind);
 }
 
 static void test_others_change_nothing(void **state)
