@@ -38,7 +38,7 @@ static struct span span_of_boxes(const struct patina_scene *scene, const struct 
     const double *matrix = source == PATINA_COLOR_OBJECT_HEIGHT ? as_it_is : instance->style.world_from_object;
     struct spread spread = {.scene = scene, .distances = source == PATINA_COLOR_DISTANCE, .span = {INFINITY, -INFINITY}};
     pt_camera_axes(&scene->camera, spread.axes, spread.eye);
-    pt_cloud_corners(instance->cloud, NULL, matrix, widen, &spread);
+    pt_cloud_corners(instance->whole, NULL, matrix, widen, &spread);
     return spread.span;
 }
 

@@ -35,7 +35,7 @@ enum { SOFT_TEXELS = 1024, VEIL_NUMBERS = 1 << 24 };
 
 static int casts(const struct pt_instance *instance)
 {
-    return !(instance->style.shadow_off & PATINA_SHADOW_NO_CAST) && instance->cloud->info.drawn;
+    return !(instance->style.shadow_off & PATINA_SHADOW_NO_CAST) && instance->whole->info.drawn;
 }
 
 // Whether some of its points are surface; whether some are balls that take light.
@@ -210,14 +210,15 @@ static struct patina_scene as_cut(const struct patina_scene *scene)
 // World units: of the widest ball, or of most balls of the cloud.
 static double ball_radius(const struct pt_instance *instance, int most)
 {
+    const struct patina_cloud *cloud = instance->whole;
     const double *m = instance->style.world_from_object;
     double scale = 0.0, reach = most ? 0.0 : INFINITY;
     if (instance->style.soft_radius > 0.0f)
         return (double)instance->style.soft_radius;
     for (int c = 0; c < 3; c++)
         scale = fmax(scale, sqrt(m[c] * m[c] + m[4 + c] * m[4 + c] + m[8 + c] * m[8 + c]));
-    for (uint32_t c = 0; (c = pt_chunk_from(instance->cloud, c)) < instance->cloud->chunk_count; c++) {
-        const double own = pt_soft_reach(instance->cloud, &instance->cloud->chunks[c]);
+    for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < cloud->chunk_count; c++) {
+        const double own = pt_soft_reach(cloud, &cloud->chunks[c]);
         reach = most ? fmax(reach, own) : fmin(reach, own);
     }
     return !isfinite(reach) ? 0.0 : scale * (most ? reach : 0.5 * reach);
@@ -367,6 +368,7 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
     struct extent extent = look(scene, group, axes, position);
     if (!extent.some || (!parallel && !(extent.lower[2] < 0.0)))
         return 0;
+    out->in_parts = scene->in_parts;
     out->clips = scene->clips;
     out->clip_count = as_cut(scene).clip_count;
     out->instances = instances;
@@ -461,7 +463,7 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
                                       .clips = scene->clips,
                                       .clip_count = as_cut(scene).clip_count,
                                       .has_camera = 1};
-        struct pt_plan plan = {0};
+        struct pt_plan plan = {.ids.filled = 1}; // as maps are, whatever the clouds are drawn as
         if (planned->cube)
             face_axes(face, axes);
         struct extent extent = look(scene, NULL, axes, position);

@@ -549,10 +549,13 @@ static int number_seen(const struct patina_scene *scene, struct pt_plan *plan, s
 
 static int look_and_number(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
 {
+    plan->ids.filled = plan->map; // maps have no discs
     const struct pt_plan before = *plan;
     int error = number_seen(scene, plan, survey);
     if (error || pt_plan_number(scene, plan))
         return error;
+    if (plan->map)
+        return pt_plan_too_many(scene, plan);
     struct pt_arena *arena = plan->arena; // anew: points that are no discs are seen less far
     *plan = before;
     plan->arena = arena;
