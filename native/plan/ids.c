@@ -27,12 +27,11 @@ int pt_plan_number(const struct patina_scene *scene, struct pt_plan *plan)
 
 int pt_plan_too_many(const struct patina_scene *scene, const struct pt_plan *plan)
 {
-    return pt_fail(
-        &scene->handle, PATINA_ERROR_TOO_MANY_POINTS,
-        "%s would look through %llu points and triangles, and no more than 4294967294 can be told apart: %s",
-        plan->map ? "a light's map" : "the picture", (unsigned long long)(plan->ids.points + triangles_of(scene)),
-        plan->map ? "let fewer clouds cast shadows"
-                  : "let it see a smaller part, or clouds in levels no finer than it needs (settings.detail)");
+    return pt_fail(&scene->handle, PATINA_ERROR_TOO_MANY_POINTS,
+                   "%s would look through %llu points and triangles, and no more than 4294967294 can be told apart: %s",
+                   plan->map ? "a light's map" : "the picture", (unsigned long long)(plan->ids.points + triangles_of(scene)),
+                   plan->map ? "let fewer clouds cast shadows"
+                             : "let it see a smaller part, or clouds in levels no finer than it needs (settings.detail)");
 }
 
 void pt_set_ids(const struct pt_plan *plan, uint32_t instance, uint32_t discs, struct instance_args *args)

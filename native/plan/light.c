@@ -112,6 +112,14 @@ int pt_casts_in_layers(const struct patina_scene *scene)
     return 0;
 }
 
+// Whether some part of its cloud does.
+static int receives(const struct pt_instance *instance)
+{
+    struct pt_instance whole = *instance;
+    whole.cloud = instance->whole;
+    return pt_receives(&whole);
+}
+
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups)
 {
     uint32_t count = 0, casters = 0;
@@ -125,7 +133,7 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
         const struct pt_instance *instance = &scene->instances[i];
         if (!pt_is_first_part(scene, i))
             continue;
-        if (opaque(instance) && spares_itself(instance) && pt_receives(instance) && casters > 1)
+        if (opaque(instance) && spares_itself(instance) && receives(instance) && casters > 1)
             groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, i, 255, 0, 0};
         if (casts_solid(instance) && loss_of(instance) && !opaque(instance))
             groups[count++] = (struct pt_shadow_group){i, PT_NO_INSTANCE, loss_of(instance), in_layers(instance), 0};

@@ -2,6 +2,8 @@
 // What is read of a frame: passes, layers, keys, shadow textures, statistics, planes.
 #include "frame.h"
 
+#include "scene/paged.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -128,6 +130,8 @@ static int read_part(const struct patina_frame *frame, uint32_t instance, uint32
     const struct pt_shadows *shadows = &frame->shadows;
     const struct patina_cloud *cloud = frame->numbering.clouds[instance].cloud;
     const size_t bytes = shadows->words[instance].size / shadows->light_count;
+    if (!bytes)
+        return PATINA_OK; // nothing of it was there
     uint32_t *words = malloc(bytes + 1);
     if (!words)
         return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read_shadows: out of memory");
@@ -147,8 +151,10 @@ int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t number, uin
     const struct pt_shadows *shadows = &frame->shadows;
     uint32_t first;
     const uint32_t parts = pt_numbering_parts(&frame->numbering, number, &first);
-    if (!parts || first + parts > shadows->instance_count || light >= shadows->light_count || !shadows->words[first].size ||
-        !shadows->lights[light].samples)
+    uint64_t words = 0;
+    for (uint32_t i = first; i < first + parts && i < shadows->instance_count; i++)
+        words += shadows->words[i].size;
+    if (!words || first + parts > shadows->instance_count || light >= shadows->light_count || !shadows->lights[light].samples)
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: no texture of light %u on instance %u",
                        light, number);
     const struct patina_cloud *cloud = pt_numbering_cloud(&frame->numbering, first);
@@ -161,8 +167,10 @@ int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t number, uin
     for (size_t i = 0; i < count; i++)
         values[i] = 1.0f; // of points that are not drawn
     int error = PATINA_OK;
+    pt_paged_enter(cloud, 0);
     for (uint32_t i = first; i < first + parts && !error; i++)
         error = read_part(frame, i, light, values);
+    pt_paged_leave(cloud);
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 

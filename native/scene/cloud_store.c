@@ -357,7 +357,9 @@ int patina_cloud_save_as(const patina_cloud *cloud, const char *path, const pati
     if (error)
         return error;
     pt_paged_enter(cloud, 1);
-    error = save_as(cloud, path, &desc);
+    error = pt_paged_whole(cloud)
+                ? save_as(cloud, path, &desc) // what was full gave pages back, or somebody draws what was there
+                : pt_fail(&cloud->handle, PATINA_ERROR_UNSUPPORTED, "patina_cloud_save: points of the cloud are not all there");
     pt_paged_leave(cloud);
     return error;
 }
@@ -410,6 +412,7 @@ static int check_header(const char *path, const struct header *header, const pat
         info->has_normals > 1 || info->has_radii > 1 || !isfinite(info->radius_most) ||
         header->sight_count > header->sight_room || header->sight_room > 1u << 16 ||
         header->sight_bytes > 2u * PT_SIGHT_BYTES || info->has_scalars > 1 || info->has_shapes > 1 || info->has_classes > 1 ||
+        (info->count > UINT32_MAX && (!header->unordered || info->count != info->drawn)) || // an order has 32 bits
         !isfinite(header->spacing_base) || header->packed > 1 || header->unordered > 1 || !isfinite(header->packed_error))
         return refuse(path, "its header is damaged");
     return PATINA_OK;

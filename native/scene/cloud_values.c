@@ -114,32 +114,50 @@ int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar)
     return PATINA_OK;
 }
 
-int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2])
+// Takes every step-th finite scalar of what is there, or none; how many finite ones there are. Those that repeat a chunk's last are too few
+// to show.
+static size_t pick_scalars(const patina_cloud *cloud, size_t step, float *values)
 {
-    if (!cloud || !range || !(share >= 0.0 && share < 0.5))
-        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_scalar_range: bad arguments");
-    size_t count = 0;
-    for (uint64_t i = 0; cloud->scalars && i < cloud->slots; i++) // those that repeat a chunk's last are too few to show
-        count += isfinite(cloud->scalars[i]) != 0;
+    size_t seen = 0, taken = 0;
+    for (uint32_t c = 0; cloud->scalars && (c = pt_chunk_from(cloud, c)) < cloud->chunk_count; c++) {
+        const float *scalars = cloud->scalars + pt_chunk_slot(cloud, &cloud->chunks[c]);
+        for (uint32_t i = 0; i < cloud->chunks[c].padded; i++)
+            if (isfinite(scalars[i]) && seen++ % step == 0 && values)
+                values[taken++] = scalars[i];
+    }
+    return seen;
+}
+
+static int range_of(const patina_cloud *cloud, double share, float range[2])
+{
+    const size_t count = pick_scalars(cloud, 1, NULL);
     if (!count)
         return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "patina_cloud_scalar_range: no point has a finite scalar");
     memcpy(range, cloud->info.scalar_range, sizeof cloud->info.scalar_range);
     if (share == 0.0)
         return PATINA_OK;
     enum { MOST = 1 << 20 }; // looked at: their order statistics are those of all within a thousandth of the points
-    size_t step = (count + MOST - 1) / MOST, taken = 0, seen = 0;
-    float *values = malloc((count / step + 1) * sizeof *values);
+    const size_t step = (count + MOST - 1) / MOST, taken = (count + step - 1) / step;
+    float *values = malloc(taken * sizeof *values);
     if (!values)
         return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "patina_cloud_scalar_range: out of memory");
-    for (uint64_t i = 0; i < cloud->slots; i++)
-        if (isfinite(cloud->scalars[i]) && seen++ % step == 0)
-            values[taken++] = cloud->scalars[i];
+    pick_scalars(cloud, step, values);
     qsort(values, taken, sizeof *values, pt_compare_floats);
     size_t below = (size_t)(share * (double)(taken - 1));
     range[0] = values[below];
     range[1] = values[taken - 1 - below];
     free(values);
     return PATINA_OK;
+}
+
+int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2])
+{
+    if (!cloud || !range || !(share >= 0.0 && share < 0.5))
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_scalar_range: bad arguments");
+    pt_paged_enter(cloud, 0);
+    const int error = range_of(cloud, share, range);
+    pt_paged_leave(cloud);
+    return error;
 }
 
 // ---- classes -------------------------------------------------------------------------------------------------------------

@@ -265,7 +265,7 @@ int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc
                         .desc = &checked,
                         .values = checked.values,
                         .field = field_begin(cloud),
-                        .numbers = malloc((cloud->slots + 1) * sizeof *fill.numbers)};
+                        .numbers = calloc(cloud->slots + 1, sizeof *fill.numbers)};
     if (checked.source == PATINA_FIELD_DISTANCE && !place_shape(&fill))
         error = pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: the shape is flat");
     else if ((error = fill_field(&fill, progress)) == PATINA_ERROR_MEMORY)

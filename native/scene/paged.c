@@ -305,13 +305,25 @@ void pt_paged_leave(const struct patina_cloud *cloud)
     pt_mutex_unlock(&cloud->paged->lock);
 }
 
+int pt_paged_whole(const struct patina_cloud *cloud)
+{
+    return !cloud->paged || cloud->paged->present == cloud->paged->page_count;
+}
+
 int pt_paged_refuse(const struct patina_cloud *cloud, const char *call)
 {
     if (cloud->paged && cloud->part_count)
         return pt_fail(&cloud->handle, PATINA_ERROR_TOO_MANY_POINTS,
                        "%s: does not take a cloud in pages of more than 2147483647 points yet, and these are %llu", call,
                        (unsigned long long)cloud->info.count);
-    if (!pt_paged_absent(cloud))
+    if (!cloud->paged)
+        return PATINA_OK;
+    pt_mutex_lock(&cloud->paged->lock);
+    if (!cloud->paged->inside) // what arrived has no chunks yet
+        renew_chunks((struct patina_cloud *)(uintptr_t)cloud);
+    const int whole = pt_paged_whole(cloud);
+    pt_mutex_unlock(&cloud->paged->lock);
+    if (whole)
         return PATINA_OK;
     return pt_fail(&cloud->handle, PATINA_ERROR_UNSUPPORTED, "%s: points of the cloud are still on their way", call);
 }

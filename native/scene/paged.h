@@ -13,6 +13,8 @@ struct pt_paged;
 void pt_paged_destroy(struct patina_cloud *cloud);
 // Frees the table of chunks of any cloud.
 void pt_chunks_free(struct patina_cloud *cloud);
+// Whether all points are part of the cloud, as pictures see it; of others than such a cloud too. Within pt_paged_enter.
+int pt_paged_whole(const struct patina_cloud *cloud);
 // PATINA_ERROR_UNSUPPORTED, with a message that names the call, where points are on their way.
 int pt_paged_refuse(const struct patina_cloud *cloud, const char *call);
 

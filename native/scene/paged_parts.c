@@ -6,6 +6,8 @@
 
 #include <stdlib.h>
 
+enum { PAGED_PART = 1 << 26 }; // slots at most
+
 // The pages from `first` on that fit; one at least.
 static uint32_t fitting(const struct pt_paged *paged, uint32_t first, uint64_t most)
 {
@@ -42,7 +44,7 @@ static int make_part(const struct patina_cloud *whole, const struct pt_page *fir
 int pt_paged_parts(struct patina_cloud *cloud)
 {
     const struct pt_paged *paged = cloud->paged;
-    const uint64_t each = pt_part_share(pt_part_slots());
+    const uint64_t each = pt_part_slots() < PAGED_PART ? pt_part_slots() : PAGED_PART;
     uint32_t count = 0;
     if (cloud->slots <= pt_part_slots())
         return PATINA_OK;

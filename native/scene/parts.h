@@ -10,7 +10,8 @@
 // Slots of a cloud that is no part and has none: 2^31 - 1 at most, or fewer where PATINA_PART_SLOTS says so, for tests; one chunk at least.
 uint64_t pt_part_slots(void);
 // Those that each part has at most of a cloud that has more than `most`. A picture's ids reach over all slots of a part between the first and
-// the last that it sees (plan/ids.c): of smaller parts it sees fewer, and each has passes of its own.
+// the last that it sees (plan/ids.c): of smaller parts it sees fewer, and each has passes of its own. Pages, of which few are there, have parts
+// of a quarter.
 static inline uint64_t pt_part_share(uint64_t most) { return most < 1u << 28 ? most : 1u << 28; }
 
 static inline uint32_t pt_part_count(const struct patina_cloud *cloud) { return cloud->part_count ? cloud->part_count : 1; }

@@ -117,6 +117,10 @@ static int analyse(struct job *job, patina_cloud *cloud, const char *path, const
         tool_use_grid(stations, path, &desc);
     const int code = patina_cloud_analyse(cloud, &desc, job->progress);
     job->analysis_ms += pt_milliseconds() - start;
+    if (code == PATINA_ERROR_TOO_MANY_POINTS && job->options.analysis == TOOL_ANALYSED_WHERE_NEEDED) {
+        tool_say("note: %s is drawn without an analysis: it has more points than one takes", path);
+        return PATINA_OK;
+    }
     return code;
 }
 

@@ -13,7 +13,8 @@
 enum { TORUS = 60000, SIZE = 128, BYTES = (TORUS + 7) / 8 };
 
 enum kind { FILLED, SPLATS, DISCS, GLASS, SOFT, LINES, SELFLESS, HEIGHTS, DISTANCES, KINDS };
-static const char *const names[KINDS] = {"filled", "splats", "discs", "glass", "soft", "lines", "without its own shadow", "by height", "by distance"};
+static const char *const names[KINDS] = {"filled",    "splats",     "discs", "glass", "soft", "lines", "without its own shadow",
+                                         "by height", "by distance"};
 
 static patina_cloud *make(const struct points *points, enum kind kind, int in_parts)
 {
@@ -35,9 +36,7 @@ static void add(patina_scene *scene, const patina_cloud *cloud, enum kind kind, 
     style.transparency = kind == GLASS ? 0.25f : 0.0f;
     style.soft = kind == SOFT ? PATINA_SOFT_ALL : PATINA_SOFT_OFF;
     style.soft_radius = kind == SOFT ? 0.03f : 0.0f;
-    style.color_source = kind == HEIGHTS     ? PATINA_COLOR_HEIGHT
-                         : kind == DISTANCES ? PATINA_COLOR_DISTANCE
-                                             : PATINA_COLOR_OWN;
+    style.color_source = kind == HEIGHTS ? PATINA_COLOR_HEIGHT : kind == DISTANCES ? PATINA_COLOR_DISTANCE : PATINA_COLOR_OWN;
     style.shadow_off = kind == SELFLESS && x > 0 ? PATINA_SHADOW_NO_SELF : 0;
     CHECK(patina_scene_add_cloud(scene, cloud, &style), scene);
 }

@@ -2,7 +2,7 @@
 // Clouds whose points arrive page by page (SPEC 14): whatever the order, the same picture in the end, as of the saved file; before, what
 // has arrived; lists of what is wanted; pages that are not what was promised.
 #include "clouds.h"
-#include "scene/parts.h"
+#include "scene/cloud.h"
 #include "support.h"
 
 #include <math.h>
@@ -127,8 +127,7 @@ static patina_scene *stage_of(patina_cloud *cloud, int near_by, uint32_t lights,
     patina_cloud_style style = PATINA_CLOUD_STYLE_INIT;
     style.lighting = lights ? PATINA_LIGHTING_LIT : PATINA_LIGHTING_AUTO;
     CHECK(patina_scene_create(&scene), NULL);
-    for (uint32_t i = 0; i < pt_part_count(cloud); i++)
-        CHECK(patina_scene_add_cloud(scene, pt_part(cloud, i), &style), scene);
+    CHECK(patina_scene_add_cloud(scene, cloud, &style), scene);
     const patina_light_desc light = {
         .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 2, .direction = {-1, 0.5, -2}, .shadows = 1};
     if (lights)
@@ -414,6 +413,30 @@ static void test_cap(void **state)
     free_tree(tree);
 }
 
+// What arrived, and no picture has taken in yet, is there for other calls; a share of it is not.
+static void test_colors_before_pictures(void **state)
+{
+    (void)state;
+    enum { GREY = 200 };
+    struct tree *tree = make_tree();
+    patina_cloud *cloud = begin(tree, 0);
+    uint8_t *grey = malloc(3 * POINTS);
+    assert_non_null(grey);
+    memset(grey, GREY, 3 * POINTS);
+    const patina_array colors = {.data = grey, .type = PATINA_UINT8, .components = 3};
+    for (uint32_t p = 0; p < tree->count; p++) {
+        if (p == tree->count - 1)
+            assert_int_equal(patina_cloud_set_colors(cloud, &colors), PATINA_ERROR_UNSUPPORTED);
+        give(cloud, tree, p);
+    }
+    CHECK(patina_cloud_set_colors(cloud, &colors), cloud);
+    for (uint64_t i = 0; i < 3 * cloud->slots; i++)
+        assert_int_equal(((const uint8_t *)cloud->colors)[i], GREY);
+    patina_cloud_destroy(cloud);
+    free(grey);
+    free_tree(tree);
+}
+
 // ---- clouds in parts ---------------------------------------------------------------------------------------------------
 
 static void set_variable(const char *name, const char *value)
@@ -435,14 +458,6 @@ static patina_cloud *begin_in_parts(const struct tree *tree, uint64_t cap)
     set_variable("PATINA_PART_SLOTS", NULL);
     assert_true(cloud->part_count > 4);
     return cloud;
-}
-
-// Instances' points are numbered one behind the other: of parts of one cloud this number is wanted.
-static void number_anew(struct picture *picture)
-{
-    for (int i = 0; i < WIDTH * HEIGHT; i++)
-        if (picture->keys[i] != KEY_EMPTY)
-            picture->keys[i] -= key_id(picture->keys[i]) - key_id(picture->keys[i]) % POINTS;
 }
 
 // Whatever the order of the pages, before all are there and after, and under a cap that gives some back: what is wanted, and the bytes of the
@@ -476,7 +491,6 @@ static void in_parts(patina_device *device, const char *name)
             }
             assert_int_equal(count[0], count[1]);
             assert_memory_equal(wanted[0], wanted[1], count[0] * sizeof **wanted);
-            number_anew(&pictures[1]);
             picture_assert_identical(&pictures[1], &pictures[0], 0, 0, looks[l].name);
             assert_true(!turn || picture_count(&pictures[0]) > WIDTH * HEIGHT / 20);
             picture_free(&pictures[0]);
@@ -505,9 +519,13 @@ static void test_in_parts(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_beside_flat),
-                                       cmocka_unit_test(test_partial),    cmocka_unit_test(test_wanted),
-                                       cmocka_unit_test(test_damaged),    cmocka_unit_test(test_cap),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_bytes),
+                                       cmocka_unit_test(test_beside_flat),
+                                       cmocka_unit_test(test_partial),
+                                       cmocka_unit_test(test_wanted),
+                                       cmocka_unit_test(test_damaged),
+                                       cmocka_unit_test(test_cap),
+                                       cmocka_unit_test(test_colors_before_pictures),
                                        cmocka_unit_test(test_in_parts)};
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);
