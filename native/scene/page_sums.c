@@ -157,11 +157,11 @@ int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arr
 void pt_pages_tell(const struct patina_cloud *cloud)
 {
     struct pt_page_sums *sums = cloud->page_sums;
-    const struct pt_chunk *chunks = cloud->chunks - cloud->first_chunk; // of the whole, of which it may be a part
     uint32_t pages = 0, first = 0;
     uint64_t points = 0;
     if (!sums || !atomic_exchange(&sums->untold, 0))
         return;
+    const struct pt_chunk *chunks = cloud->chunks - cloud->first_chunk; // of the whole, of which it may be a part
     for (uint32_t c = 0; c < sums->chunk_count; c++)
         if (sums->states[c] & PT_PAGE_DAMAGED && !(atomic_fetch_or(&sums->states[c], PT_PAGE_TOLD) & PT_PAGE_TOLD)) {
             first = pages++ ? first : c;
