@@ -21,24 +21,10 @@ static uint32_t fitting(const struct pt_paged *paged, uint32_t first, uint64_t m
 static int make_part(const struct patina_cloud *whole, const struct pt_page *first, const struct pt_page *last,
                      struct patina_cloud *part)
 {
-    struct pt_section sections[PT_ARRAYS];
-    *part = *whole;
-    part->parts = NULL;
-    part->part_count = 0;
-    part->first_chunk = first->first_chunk;
-    part->first_slot = first->first_slot;
-    part->first_number = first->first_number;
-    part->chunks = whole->chunks + first->first_chunk;
-    part->chunk_count = last->first_chunk + last->chunk_count - first->first_chunk;
+    const uint32_t chunks = last->first_chunk + last->chunk_count - first->first_chunk;
+    const int error = pt_part_begin(whole, first->first_chunk, chunks, first->first_slot, first->first_number, part);
     part->slots = last->first_slot + last->slots - first->first_slot;
-    part->info.chunks = part->chunk_count;
-    pt_cloud_sections(part, sections);
-    for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
-        if (*sections[i].data)
-            *sections[i].data = (char *)*sections[i].data + part->first_slot * pt_cloud_array_bytes(whole, (enum pt_array)i);
-    pt_handle_init(&part->handle);
-    part->alive = pt_alive_create();
-    return part->alive ? PATINA_OK : PATINA_ERROR_MEMORY;
+    return error;
 }
 
 int pt_paged_parts(struct patina_cloud *cloud)

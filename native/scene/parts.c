@@ -36,9 +36,8 @@ static void lay_arrays(const struct patina_cloud *whole, struct patina_cloud *pa
     }
 }
 
-// Part of the whole from a chunk on, whose points before it are known.
-static int make_part(const struct patina_cloud *whole, uint32_t first_chunk, uint32_t chunks, const struct patina_cloud *before,
-                     struct patina_cloud *part)
+int pt_part_begin(const struct patina_cloud *whole, uint32_t first_chunk, uint32_t chunks, uint64_t first_slot,
+                  uint64_t first_number, struct patina_cloud *part)
 {
     *part = *whole;
     part->parts = NULL;
@@ -46,21 +45,30 @@ static int make_part(const struct patina_cloud *whole, uint32_t first_chunk, uin
     part->clusters = NULL;
     part->begins = NULL;
     part->first_chunk = first_chunk;
-    part->first_slot = before ? before->first_slot + before->slots : 0;
-    part->first_number = before ? before->first_number + before->info.drawn : 0;
+    part->first_slot = first_slot;
+    part->first_number = first_number;
     part->chunks = whole->chunks + first_chunk;
     part->chunk_count = chunks;
+    part->info.chunks = chunks;
+    lay_arrays(whole, part);
+    pt_handle_init(&part->handle);
+    part->alive = pt_alive_create();
+    return part->alive ? PATINA_OK : PATINA_ERROR_MEMORY;
+}
+
+// Part of the whole from a chunk on, whose points before it are known.
+static int make_part(const struct patina_cloud *whole, uint32_t first_chunk, uint32_t chunks, const struct patina_cloud *before,
+                     struct patina_cloud *part)
+{
+    const int error = pt_part_begin(whole, first_chunk, chunks, before ? before->first_slot + before->slots : 0,
+                                    before ? before->first_number + before->info.drawn : 0, part);
     part->slots = part->info.drawn = 0;
     for (uint32_t c = 0; c < chunks; c++) {
         part->chunks[c].first = (uint32_t)part->slots;
         part->slots += part->chunks[c].padded;
         part->info.drawn += part->chunks[c].count;
     }
-    part->info.chunks = chunks;
-    lay_arrays(whole, part);
-    pt_handle_init(&part->handle);
-    part->alive = pt_alive_create();
-    if (!part->alive || (part->unordered && pt_cloud_count_places(part)))
+    if (error || (part->unordered && pt_cloud_count_places(part)))
         return PATINA_ERROR_MEMORY;
     if (whole->clusters)
         pt_clusters_make(part);

@@ -24,6 +24,10 @@ static inline const struct patina_cloud *pt_part(const struct patina_cloud *clou
 // stays as it is. 0 or PATINA_ERROR_MEMORY (then it has no parts).
 int pt_parts_make(struct patina_cloud *cloud, uint64_t most);
 void pt_parts_destroy(struct patina_cloud *cloud);
+// A part of so many of the whole's chunks, from there on, with the whole's arrays and a life of its own; its slots are the caller's to say.
+// 0 or PATINA_ERROR_MEMORY.
+int pt_part_begin(const struct patina_cloud *whole, uint32_t first_chunk, uint32_t chunks, uint64_t first_slot,
+                  uint64_t first_number, struct patina_cloud *part);
 // Parts take over what the whole has for arrays of points and says of them, which are others now.
 void pt_parts_follow(struct patina_cloud *cloud);
 // PATINA_ERROR_TOO_MANY_POINTS, with a message that names the call, of a cloud in parts: for calls that take none yet.
