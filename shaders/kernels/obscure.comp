@@ -49,7 +49,10 @@ float tap(view_args view, point p, vec2 s, uint x, uint y)
     uint qx = x + uint(int(dx)), qy = y + uint(int(dy)); // -1 wraps to beyond the plane
     if (qx >= view.width || qy >= view.height)
         return 0.0;
-    float z = read_z(qy * view.width + qx);
+    uint bits = read_z_bits(qy * view.width + qx);
+    if (bits == PT_KEY_EMPTY_Z) // there square may be no number, of which drivers say that it is below 1
+        return 0.0;
+    float z = pt_float(bits);
     precise vec3 v = vec3(view.ray_xs * dx, view.ray_ys * dy, p.z - z);
     if (view.perspective != 0u) {
         v.x = z * (p.ray.x + v.x) - p.z * p.ray.x;
@@ -57,7 +60,7 @@ float tap(view_args view, point p, vec2 s, uint x, uint y)
     }
     v = v * p.inverse;
     precise float square = (v.x * v.x + v.y * v.y) + v.z * v.z;
-    if (!(square < 1.0)) // nor where the tap is empty: its z is +inf
+    if (!(square < 1.0))
         return 0.0;
     precise float cosine = ((p.n.x * v.x + p.n.y * v.y) + p.n.z * v.z) * pt_rsqrt(square + 1e-4);
     precise float above = pt_max(cosine - PT_OBSCURE_BIAS, 0.0);
