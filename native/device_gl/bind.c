@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What runners of kernels share: programs, buffers bound as kernels.def lists them, memory of the device's own, dispatches.
+// What runners of kernels share: programs, buffers bound as kernels.def lists them, dispatches.
 #include "device_gl.h"
 #include "shared/measured.h"
 
@@ -97,31 +97,6 @@ void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size)
     d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
 }
 
-int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep)
-{
-    const GladGLContext *gl = &d->gl;
-    struct pt_gl_scratch *scratch = &d->scratch[use];
-    if (size <= scratch->size)
-        return PATINA_OK;
-    size = (size + size / 4 + 4095) & ~(size_t)4095;
-    GLuint name = 0;
-    gl->GenBuffers(1, &name);
-    gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
-    gl->BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)size, NULL, GL_DYNAMIC_COPY);
-    if (keep) {
-        gl->BindBuffer(GL_COPY_READ_BUFFER, scratch->name);
-        gl->CopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, (GLsizeiptr)keep);
-    }
-    int result = pt_gl_check(d, "making room for a kernel");
-    if (result != PATINA_OK) {
-        gl->DeleteBuffers(1, &name);
-        return result;
-    }
-    gl->DeleteBuffers(1, &scratch->name);
-    *scratch = (struct pt_gl_scratch){name, size};
-    return PATINA_OK;
-}
-
 void pt_gl_tell_by_pixel(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant)
 {
     uint8_t *told = &d->told_by_pixel[kernel][variant];
@@ -150,38 +125,4 @@ int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t 
 {
     enum { COLUMNS = 64, ROWS = 4 }; // of a workgroup, as in lib/planes.glsl
     return pt_gl_dispatch(d, kernel, variant, (width + COLUMNS - 1) / COLUMNS, (height + ROWS - 1) / ROWS);
-}
-
-// In software the memory is at hand, and the driver clears by a call every 8 bytes: 2.0 ms for the keys of 1024² in place of 0.3.
-static int clear_mapped(struct pt_gl_device *d, size_t offset, size_t size, uint64_t first, uint64_t second)
-{
-    const size_t count = (size + 7) / 8; // buffers are padded
-    uint64_t *to = d->gl.MapBufferRange(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)(8 * count),
-                                        GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT);
-    if (!to)
-        return pt_gl_check(d, "clearing a buffer");
-    for (size_t i = 0; i < count / 2; i++) {
-        to[2 * i] = first;
-        to[2 * i + 1] = second;
-    }
-    if (count & 1)
-        to[count - 1] = first;
-    d->gl.UnmapBuffer(GL_COPY_WRITE_BUFFER);
-    return pt_gl_check(d, "clearing a buffer");
-}
-
-int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
-                uint32_t bytes)
-{
-    static const GLenum formats[] = {GL_R32UI, GL_RG32UI, GL_NONE, GL_RGBA32UI};
-    static const GLenum parts[] = {GL_RED_INTEGER, GL_RG_INTEGER, GL_NONE, GL_RGBA_INTEGER};
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, buffer->name);
-    if (!size)
-        return PATINA_OK;
-    if (!d->base.info.hardware)
-        return clear_mapped(d, offset, size, (uint64_t)words[1] << 32 | words[0], (uint64_t)words[3] << 32 | words[2]);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, formats[bytes / 4 - 1], (GLintptr)offset, (GLsizeiptr)(size - size % bytes),
-                             parts[bytes / 4 - 1], GL_UNSIGNED_INT, words);
-    return pt_gl_check(d, "clearing a buffer");
 }

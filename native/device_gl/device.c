@@ -60,6 +60,8 @@ static int close_context(struct pt_gl_device *d, void *unused)
         for (int i = 0; i < 2; i++)
             d->gl.DeleteProgram(d->tile_programs[i]);
         d->gl.DeleteProgram(d->list_program);
+        d->gl.DeleteProgram(d->clear_program);
+        d->gl.DeleteBuffers(1, &d->staging.name);
         d->gl.DeleteTextures(PT_UNIT_COUNT, d->textures);
         d->gl.DeleteQueries((GLsizei)d->query_count, d->queries);
         d->gl.DeleteBuffers(1, &d->arguments);
@@ -260,10 +262,7 @@ static int write_buffer(struct pt_gl_device *d, void *context)
 static int read_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    d->gl.BindBuffer(GL_COPY_READ_BUFFER, b->buffer->name);
-    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, (GLintptr)b->offset, (GLsizeiptr)b->size, b->target);
-    return pt_gl_check(d, "reading a buffer back");
+    return pt_gl_read(d, b->buffer->name, b->offset, b->size, b->target);
 }
 
 static int fill_buffer(struct pt_gl_device *d, void *context)
@@ -271,7 +270,7 @@ static int fill_buffer(struct pt_gl_device *d, void *context)
     const struct buffer_call *b = context;
     const uint32_t low = (uint32_t)b->pattern, high = b->bytes == 8 ? (uint32_t)(b->pattern >> 32) : low;
     pt_gl_tiles_forget(d);
-    return pt_gl_clear(d, b->buffer, b->offset, b->size, (const uint32_t[]){low, high, low, high}, b->bytes);
+    return pt_gl_clear(d, b->buffer->name, b->offset, b->size, (const uint32_t[]){low, high, low, high});
 }
 
 static int run_kernel(struct pt_gl_device *d, void *context) { return pt_gl_run(d, context); }

@@ -84,7 +84,7 @@ struct pt_gl_device {
     GLuint programs[PT_KERNEL_COUNT][PT_GL_VARIANTS];
     char shade_definitions[PT_GL_VARIANTS][256]; // of shade's programs, shade_count of them
     uint32_t shade_count;
-    GLuint tile_programs[2], list_program;
+    GLuint tile_programs[2], list_program, clear_program;
     GLuint shown; // the key plane that PT_GL_SCRATCH_SHOWN is of, as long as no kernel writes planes; else 0
     GLuint textures[PT_UNIT_COUNT];
     GLuint *queries; // timers, query_count of them
@@ -102,6 +102,7 @@ struct pt_gl_device {
     void *watched;
     struct pt_gl_tiles tiles;
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
+    struct pt_gl_scratch staging; // what is read back passes through
 };
 
 // fail.c
@@ -149,12 +150,14 @@ void pt_gl_tell_by_pixel(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y);
 // Workgroups for every pixel, of programs whose invocations take several of a row each (lib/planes.glsl).
 int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height);
+
+// memory.c
 // At least `size` bytes; keeps the first `keep` bytes when it has to grow.
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep);
-
-// words: 16 bytes; a pattern of 4 or 8 `bytes` repeats in them. Offset and size are multiples of 8, or size reaches the end.
-int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
-                uint32_t bytes);
+// words: 16 bytes; a shorter pattern repeats in them. Offset and size are multiples of 8, or size reaches the end.
+int pt_gl_clear(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, const uint32_t words[4]);
+// Waits for all that was asked for before.
+int pt_gl_read(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, void *target);
 
 // ranges.c: clouds that are larger than what the device may hold of them
 enum { PT_GL_BUFFERS = 24, PT_GL_WINNERS = 2 };

@@ -78,11 +78,9 @@ static int prepare(struct fill *f)
         return result;
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name);
     gl->BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, none);
-    if (refills) {
-        gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_FILLED].name);
-        gl->ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)bits, GL_RED_INTEGER, GL_UNSIGNED_INT, NULL);
-    }
-    return pt_gl_check(f->d, "preparing to fill holes");
+    if (refills)
+        result = pt_gl_clear(f->d, f->d->scratch[PT_GL_SCRATCH_FILLED].name, 0, bits, (const uint32_t[4]){0});
+    return result == PATINA_OK ? pt_gl_check(f->d, "preparing to fill holes") : result;
 }
 
 // Takes what a head says.
@@ -138,8 +136,7 @@ static int is_over(struct fill *f, enum pt_gl_scratch_use use, uint32_t head)
     uint32_t walk[PT_GL_LIST_HEAD / 4];
     if (f->d->base.info.hardware)
         return 0;
-    f->d->gl.BindBuffer(GL_COPY_READ_BUFFER, f->d->scratch[use].name);
-    f->d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, head * PT_GL_LIST_HEAD, sizeof walk, walk);
+    pt_gl_read(f->d, f->d->scratch[use].name, head * PT_GL_LIST_HEAD, sizeof walk, walk);
     return !walk[3];
 }
 

@@ -189,7 +189,7 @@ int pt_gl_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, const
     const uint32_t find = 2 * (args.antialias.inked != 0);
     uint32_t words[4];
     memcpy(words, args.compose.background, sizeof words);
-    int result = pt_gl_clear(d, combined, 0, combined->size, words, sizeof words);
+    int result = pt_gl_clear(d, combined->name, 0, combined->size, words);
     if (result == PATINA_OK)
         result = pt_gl_tiles(d, passes[0].buffers[PT_BUF_smooth_keys], &args.smooth.view);
     for (uint32_t i = find; i < find + 2 && result == PATINA_OK; i++)

@@ -118,10 +118,7 @@ static int read_keys(struct pt_gl_device *d, const struct pt_buffer *keys)
     }
     if (!d->host)
         return pt_gl_fail(d, PATINA_ERROR_MEMORY, "out of memory");
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    d->gl.BindBuffer(GL_COPY_READ_BUFFER, keys->name);
-    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, (GLsizeiptr)keys->size, d->host);
-    return pt_gl_check(d, "reading which points are shown");
+    return pt_gl_read(d, keys->name, 0, keys->size, d->host);
 }
 
 int pt_gl_gather_winners(struct pt_gl_device *d, const struct pt_gl_work *work, const struct pt_buffer *buffer, uint32_t place,

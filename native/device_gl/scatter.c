@@ -207,9 +207,7 @@ static int read_chunks(struct pt_gl_device *d, const struct pt_buffer *list, str
     *copy = malloc(list->size);
     if (!*copy)
         return pt_gl_fail(d, PATINA_ERROR_MEMORY, "out of memory");
-    d->gl.BindBuffer(GL_COPY_READ_BUFFER, list->name);
-    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, (GLsizeiptr)list->size, *copy);
-    return pt_gl_check(d, "reading a list of chunks");
+    return pt_gl_read(d, list->name, 0, list->size, *copy);
 }
 
 static int run_instance(struct pt_gl_device *d, struct instance_buffers *b, uint32_t pass)
@@ -342,21 +340,16 @@ static int make_sums(struct pt_gl_device *d, uint32_t width, uint32_t height, ui
     return result == PATINA_OK ? pt_gl_bind(d, binding, d->scratch[PT_GL_SCRATCH_SUMS].name, 0, size, what) : result;
 }
 
-static void clear_sums(struct pt_gl_device *d, uint32_t width, uint32_t rows)
+static int clear_sums(struct pt_gl_device *d, uint32_t width, uint32_t rows)
 {
-    const uint32_t zero = 0;
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_SUMS].name);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)((size_t)rows * width * SUM_BYTES), GL_RED_INTEGER,
-                             GL_UNSIGNED_INT, &zero);
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    return pt_gl_clear(d, d->scratch[PT_GL_SCRATCH_SUMS].name, 0, (size_t)rows * width * SUM_BYTES, (const uint32_t[4]){0});
 }
 
 static int blend_band(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t first, uint32_t end)
 {
     const struct blend_args *args = work->arguments;
     const uint32_t width = args->view.width, part = PART * args->part;
-    int result = PATINA_OK;
-    clear_sums(d, width, end - first);
+    int result = clear_sums(d, width, end - first);
     for (uint32_t step = 0; step < 3; step++) {
         const GLuint program = d->programs[PT_KERNEL_blend][part + (step == 2 ? ADD + LARGE : step)];
         d->gl.ProgramUniform1i(program, 3, (GLint)first);
@@ -426,12 +419,13 @@ static int mean_band(struct pt_gl_device *d, struct instance_buffers *b, uint32_
 {
     const struct view_args *view = b->work->arguments;
     const enum pt_kernel kernel = b->work->kernel;
-    clear_sums(d, view->width, end - first);
+    int result = clear_sums(d, view->width, end - first);
     for (uint32_t step = ADD; step <= MEAN; step++) {
         d->gl.ProgramUniform1i(d->programs[kernel][step], 3, (GLint)first);
         d->gl.ProgramUniform1i(d->programs[kernel][step], 4, (GLint)end);
     }
-    int result = run_instance(d, b, ADD);
+    if (result == PATINA_OK)
+        result = run_instance(d, b, ADD);
     if (result == PATINA_OK && kernel == PT_KERNEL_average)
         result = bind_shown_colors(d, b->work);
     return result == PATINA_OK ? pt_gl_dispatch(d, kernel, MEAN, (view->width + 31) / 32, (end - first + 7) / 8) : result;

@@ -77,21 +77,17 @@ static int make_room(struct pt_gl_device *d, const struct soft *soft)
     return result;
 }
 
-static void clear(struct pt_gl_device *d, GLuint name, size_t offset, size_t size)
+static int clear(struct pt_gl_device *d, GLuint name, size_t offset, size_t size)
 {
-    const uint32_t zero = 0;
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, name);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, (GLintptr)offset, (GLsizeiptr)size, GL_RED_INTEGER,
-                             GL_UNSIGNED_INT, &zero);
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    return pt_gl_clear(d, name, offset, size, (const uint32_t[4]){0});
 }
 
 static int run_records(struct pt_gl_device *d, const struct soft *soft, uint32_t step)
 {
     uint32_t x, y;
-    clear(d, d->scratch[PT_GL_SCRATCH_SOFT_COUNTS].name, 0, (size_t)soft->tiles * 4);
+    const int result = clear(d, d->scratch[PT_GL_SCRATCH_SOFT_COUNTS].name, 0, (size_t)soft->tiles * 4);
     pt_gl_grid((soft->args->records + GROUP - 1) / GROUP, &x, &y);
-    return pt_gl_dispatch(d, PT_KERNEL_soft, step, x, y);
+    return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_soft, step, x, y) : result;
 }
 
 static uint32_t longest(const struct soft *soft, uint32_t first, uint32_t end)
@@ -156,8 +152,9 @@ static uint64_t most_parts(const struct soft *soft, uint64_t most)
 static int draw_part(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end, uint32_t part)
 {
     const GLuint lists = d->scratch[PT_GL_SCRATCH_COUNTERS].name;
-    clear(d, lists, part % 2 * LIST, PT_GL_LIST_HEAD);
-    int result = set_tiles(d, soft, soft->draw, first, end, part);
+    int result = clear(d, lists, part % 2 * LIST, PT_GL_LIST_HEAD);
+    if (result == PATINA_OK)
+        result = set_tiles(d, soft, soft->draw, first, end, part);
     if (result != PATINA_OK)
         return result;
     if (!part)
@@ -166,12 +163,12 @@ static int draw_part(struct pt_gl_device *d, const struct soft *soft, uint32_t f
     return result == PATINA_OK ? pt_gl_list_dispatch(d, PT_KERNEL_soft, soft->draw, lists, (part + 1) % 2 * LIST) : result;
 }
 
-static int is_over(struct pt_gl_device *d, uint32_t part)
+static int is_over(struct pt_gl_device *d, uint32_t part, int *over)
 {
-    uint32_t head[PT_GL_LIST_HEAD / 4];
-    d->gl.BindBuffer(GL_COPY_READ_BUFFER, d->scratch[PT_GL_SCRATCH_COUNTERS].name);
-    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, part % 2 * LIST, sizeof head, head);
-    return !head[3];
+    uint32_t head[PT_GL_LIST_HEAD / 4] = {0};
+    const int result = pt_gl_read(d, d->scratch[PT_GL_SCRATCH_COUNTERS].name, part % 2 * LIST, sizeof head, head);
+    *over = !head[3];
+    return result;
 }
 
 // Parts that find nothing to do cost next to nothing, so on a GPU it is looked for an end only where there may be many; software, which
@@ -180,13 +177,12 @@ static int draw_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t 
 {
     const uint64_t most = most_parts(soft, longest(soft, first, end));
     uint64_t look = d->base.info.hardware ? LOOK : 1;
-    int result = PATINA_OK;
-    for (uint64_t part = 0; part < most && result == PATINA_OK; part++) {
+    int result = PATINA_OK, over = 0;
+    for (uint64_t part = 0; part < most && !over && result == PATINA_OK; part++) {
         result = draw_part(d, soft, first, end, (uint32_t)part);
         if (result != PATINA_OK || part + 1 < look || part + 1 == most)
             continue;
-        if (is_over(d, (uint32_t)part))
-            break;
+        result = is_over(d, (uint32_t)part, &over);
         look = d->base.info.hardware ? 2 * look : look + 1;
     }
     return result;
@@ -252,14 +248,12 @@ int pt_gl_soft(struct pt_gl_device *d, const struct pt_gl_work *work)
     int result = programs(d, &soft);
     if (result == PATINA_OK)
         result = make_room(d, &soft);
-    clear(d, work->buffers[PT_BUF_soft_bins]->name, 0, TOLD);
+    if (result == PATINA_OK)
+        result = clear(d, work->buffers[PT_BUF_soft_bins]->name, 0, TOLD);
     if (result == PATINA_OK)
         result = run_records(d, &soft, COUNT);
-    if (result == PATINA_OK) {
-        d->gl.BindBuffer(GL_COPY_READ_BUFFER, d->scratch[PT_GL_SCRATCH_SOFT_COUNTS].name);
-        d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, (GLsizeiptr)((size_t)soft.tiles * 4), soft.counts);
-        result = pt_gl_check(d, "counting soft points");
-    }
+    if (result == PATINA_OK)
+        result = pt_gl_read(d, d->scratch[PT_GL_SCRATCH_SOFT_COUNTS].name, 0, (size_t)soft.tiles * 4, soft.counts);
     if (result == PATINA_OK)
         result = can_loop(d, &soft);
     for (uint32_t tile = 0; tile < soft.tiles && result == PATINA_OK;)
