@@ -62,6 +62,8 @@ static int close_context(struct pt_gl_device *d, void *unused)
         d->gl.DeleteProgram(d->list_program);
         d->gl.DeleteProgram(d->clear_program);
         d->gl.DeleteBuffers(1, &d->staging.name);
+        d->gl.DeleteBuffers(1, &d->upload);
+        d->gl.DeleteBuffers(1, &d->zeros);
         d->gl.DeleteTextures(PT_UNIT_COUNT, d->textures);
         d->gl.DeleteQueries((GLsizei)d->query_count, d->queries);
         d->gl.DeleteBuffers(1, &d->arguments);
@@ -254,9 +256,7 @@ static int write_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
     pt_gl_tiles_forget(d);
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, b->buffer->name);
-    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)b->offset, (GLsizeiptr)b->size, b->source);
-    return pt_gl_check(d, "writing a buffer");
+    return pt_gl_write(d, b->buffer->name, b->offset, b->size, b->source);
 }
 
 static int read_buffer(struct pt_gl_device *d, void *context)

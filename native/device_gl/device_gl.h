@@ -103,6 +103,7 @@ struct pt_gl_device {
     struct pt_gl_tiles tiles;
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
     struct pt_gl_scratch staging; // what is read back passes through
+    GLuint upload, zeros;         // what is written does; heads of empty lists
 };
 
 // fail.c
@@ -156,6 +157,9 @@ int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t 
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep);
 // words: 16 bytes; a shorter pattern repeats in them. Offset and size are multiples of 8, or size reaches the end.
 int pt_gl_clear(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, const uint32_t words[4]);
+int pt_gl_write(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, const void *source);
+enum { PT_GL_ZEROS = 128 };
+void pt_gl_zero(struct pt_gl_device *d, GLuint name, size_t offset, size_t size); // at most PT_GL_ZEROS bytes: heads of lists
 // Waits for all that was asked for before.
 int pt_gl_read(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, void *target);
 

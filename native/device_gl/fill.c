@@ -53,9 +53,7 @@ static int programs(struct fill *f)
 // Room for the lists if every pixel changes.
 static int prepare(struct fill *f)
 {
-    static const uint32_t none[WALKS * PT_GL_LIST_HEAD / 4];
     const struct view_args *view = &f->args->view;
-    const GladGLContext *gl = &f->d->gl;
     // an empty pixel is filled once, but what was there before says what is a stray
     int refills = f->args->unfills && (f->phase == PT_FILL_OCCLUDED || f->args->alone);
     size_t bits = ((size_t)view->width * view->height + 31) / 32 * 4;
@@ -63,7 +61,7 @@ static int prepare(struct fill *f)
     size_t changes = (size_t)(view->rect[2] - view->rect[0]) * (view->rect[3] - view->rect[1]) * CHANGE_SIZE;
     int result = programs(f);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_walks, PT_GL_SCRATCH_COUNTERS, sizeof none);
+        result = bind_scratch(f, PT_BIND_fill_walks, PT_GL_SCRATCH_COUNTERS, WALKS * PT_GL_LIST_HEAD);
     if (result == PATINA_OK)
         result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_SHADED, changes);
     if (result == PATINA_OK)
@@ -76,8 +74,7 @@ static int prepare(struct fill *f)
         result = pt_gl_list_begin(f->d, PT_GL_SCRATCH_WOKEN, PT_BIND_fill_woken, tiles);
     if (result != PATINA_OK)
         return result;
-    gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name);
-    gl->BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, none);
+    pt_gl_zero(f->d, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name, 0, WALKS * PT_GL_LIST_HEAD);
     if (refills)
         result = pt_gl_clear(f->d, f->d->scratch[PT_GL_SCRATCH_FILLED].name, 0, bits, (const uint32_t[4]){0});
     return result == PATINA_OK ? pt_gl_check(f->d, "preparing to fill holes") : result;

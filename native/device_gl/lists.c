@@ -7,14 +7,12 @@
 
 int pt_gl_list_begin(struct pt_gl_device *d, enum pt_gl_scratch_use use, uint32_t binding, size_t size)
 {
-    static const uint32_t none[PT_GL_LIST_HEAD / 4];
     int result = pt_gl_scratch(d, use, PT_GL_LIST_HEAD + size, 0);
     if (result == PATINA_OK)
         result = pt_gl_bind(d, binding, d->scratch[use].name, 0, PT_GL_LIST_HEAD + size, "a list");
     if (result != PATINA_OK)
         return result;
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[use].name);
-    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, none);
+    pt_gl_zero(d, d->scratch[use].name, 0, PT_GL_LIST_HEAD);
     return PATINA_OK;
 }
 

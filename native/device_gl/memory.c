@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Memory: what kernels keep between runs, buffers cleared and read back.
+// Memory: what kernels keep between runs; buffers cleared, written and read back.
 #include "device_gl.h"
 
 #include <string.h>
@@ -86,12 +86,51 @@ int pt_gl_clear(struct pt_gl_device *d, GLuint name, size_t offset, size_t size,
     return result;
 }
 
+// ---- writing ---------------------------------------------------------------------------------------------------------
+
+// What shaders write is written to by copies that the device makes, too: a driver was seen to lose what BufferSubData brought behind a
+// kernel's writes, barrier or not.
+int pt_gl_write(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, const void *source)
+{
+    const GladGLContext *gl = &d->gl;
+    gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
+    if (!d->base.info.hardware) {
+        gl->BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)size, source);
+    } else {
+        if (!d->upload)
+            gl->GenBuffers(1, &d->upload);
+        gl->BindBuffer(GL_COPY_READ_BUFFER, d->upload);
+        gl->BufferData(GL_COPY_READ_BUFFER, (GLsizeiptr)size, source, GL_STREAM_DRAW);
+        gl->CopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, (GLintptr)offset, (GLsizeiptr)size);
+    }
+    return pt_gl_check(d, "writing a buffer");
+}
+
+static const uint32_t nothing[PT_GL_ZEROS / 4];
+
+void pt_gl_zero(struct pt_gl_device *d, GLuint name, size_t offset, size_t size)
+{
+    const GladGLContext *gl = &d->gl;
+    gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
+    if (!d->base.info.hardware) {
+        gl->BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)size, nothing);
+        return;
+    }
+    const int made = d->zeros != 0;
+    if (!made)
+        gl->GenBuffers(1, &d->zeros);
+    gl->BindBuffer(GL_COPY_READ_BUFFER, d->zeros);
+    if (!made)
+        gl->BufferData(GL_COPY_READ_BUFFER, sizeof nothing, nothing, GL_STATIC_COPY);
+    gl->CopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, (GLintptr)offset, (GLsizeiptr)size);
+}
+
 // ---- reading back ----------------------------------------------------------------------------------------------------
 
 enum { READ_AT_ONCE = 1 << 24 };
 
-// By a copy that the device makes: of a buffer that an indirect dispatch took its workgroups from, a driver was seen to hand out what
-// had been there before that dispatch wrote; and of memory made for reading, the host reads faster.
+// By a copy that the device makes: a driver was seen to hand out, of a buffer that had been read before, what had been there then,
+// though kernels had written since; and of memory made for reading, the host reads faster.
 static int read_piece(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, void *target)
 {
     const GladGLContext *gl = &d->gl;

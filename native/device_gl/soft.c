@@ -152,9 +152,8 @@ static uint64_t most_parts(const struct soft *soft, uint64_t most)
 static int draw_part(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end, uint32_t part)
 {
     const GLuint lists = d->scratch[PT_GL_SCRATCH_COUNTERS].name;
-    int result = clear(d, lists, part % 2 * LIST, PT_GL_LIST_HEAD);
-    if (result == PATINA_OK)
-        result = set_tiles(d, soft, soft->draw, first, end, part);
+    int result = set_tiles(d, soft, soft->draw, first, end, part);
+    pt_gl_zero(d, lists, part % 2 * LIST, PT_GL_LIST_HEAD);
     if (result != PATINA_OK)
         return result;
     if (!part)

@@ -40,13 +40,11 @@ static int room(struct pt_gl_device *d, struct pt_gl_tiles *t)
 
 static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
 {
-    static const uint32_t none[PT_GL_LIST_HEAD / 4];
     const GladGLContext *gl = &d->gl;
     const struct pt_gl_scratch *s = d->scratch;
     size_t tiles = (size_t)t->columns * t->rows;
-    gl->BindBuffer(GL_COPY_WRITE_BUFFER, s[PT_GL_SCRATCH_TILE_LISTS].name);
     for (int i = 0; i < LISTS; i++)
-        gl->BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)(i * t->stride * 4), sizeof none, none);
+        pt_gl_zero(d, s[PT_GL_SCRATCH_TILE_LISTS].name, i * t->stride * 4, PT_GL_LIST_HEAD);
     int result = pt_gl_bind(d, PT_BIND_tile_lists_tiles, s[PT_GL_SCRATCH_TILES].name, 0, tiles * 4, "tiles");
     if (result == PATINA_OK)
         result = pt_gl_bind(d, PT_BIND_tile_lists_lists, s[PT_GL_SCRATCH_TILE_LISTS].name, 0, LISTS * t->stride * 4, "tiles");
