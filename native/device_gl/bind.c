@@ -120,6 +120,13 @@ int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t varia
     return pt_gl_check(d, doing);
 }
 
+void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y)
+{
+    enum { GROUPS_IN_ROW = 16384 };
+    *x = count < GROUPS_IN_ROW ? count : GROUPS_IN_ROW;
+    *y = *x ? (count + *x - 1) / *x : 0;
+}
+
 // llvmpipe spends as much on an invocation as on a pixel.
 int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height)
 {

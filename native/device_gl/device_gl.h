@@ -148,6 +148,8 @@ int pt_gl_bind_texture(struct pt_gl_device *d, enum pt_unit unit, const struct p
 int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, size_t offset, size_t size); // a part of a buffer
 // Before a program runs: whether it finds what points have by pixel (ranges.c).
 void pt_gl_tell_by_pixel(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant);
+// A grid of at least `count` workgroups, within every driver's limits.
+void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y);
 // Workgroups for every pixel, of programs whose invocations take several of a row each (lib/planes.glsl).
 int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height);
@@ -187,8 +189,6 @@ int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 // Walks the list of tiles that begins there in a buffer, at most `most` of them.
 int pt_gl_dispatch_tile_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head,
                              size_t most);
-// A grid of at least `count` workgroups, within every driver's limits.
-void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 
 // lists.c
 // An empty list with room for `size` bytes of entries in this memory, bound.

@@ -10,11 +10,12 @@ enum {
 
 enum program { FIND_EMPTY, FIND_OCCLUDED, FIND_COARSE, DECIDE, APPLY, WAKE, MARK, RESTORE, SELECT, COUNT };
 
-// Heads of lists in fill.comp's walks: who walks what.
+// Heads of lists in fill.comp's walks: who walks what; behind them how many workgroups of a step have finished.
 enum { CHANGES, APPLIES, SAVES, TILES, LOOKS, WALKS };
+enum { WALKS_SIZE = (WALKS + 1) * PT_GL_LIST_HEAD };
 
-// What COUNT knows beforehand.
-enum { FOUND, WOKEN, SAVED, MARKED, SELECTED };
+// Steps of fill.comp that list something.
+enum listing { FOUND = 0, WOKEN = 3, MARKED = 4, SELECTED = 6 };
 
 struct fill {
     struct pt_gl_device *d;
@@ -50,6 +51,15 @@ static int programs(struct fill *f)
     return result;
 }
 
+// How many tiles there are: for who says how many workgroups look at all of them, and for those.
+static void tell_tiles(struct fill *f)
+{
+    const enum program counts = f->d->base.info.hardware ? f->find : COUNT;
+    const GLuint tiles = f->d->tiles.columns * f->d->tiles.rows;
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][counts], 3, tiles);
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][WAKE], 3, tiles);
+}
+
 // Room for the lists if every pixel changes.
 static int prepare(struct fill *f)
 {
@@ -61,7 +71,7 @@ static int prepare(struct fill *f)
     size_t changes = (size_t)(view->rect[2] - view->rect[0]) * (view->rect[3] - view->rect[1]) * CHANGE_SIZE;
     int result = programs(f);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_walks, PT_GL_SCRATCH_COUNTERS, WALKS * PT_GL_LIST_HEAD);
+        result = bind_scratch(f, PT_BIND_fill_walks, PT_GL_SCRATCH_COUNTERS, WALKS_SIZE);
     if (result == PATINA_OK)
         result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_SHADED, changes);
     if (result == PATINA_OK)
@@ -74,7 +84,8 @@ static int prepare(struct fill *f)
         result = pt_gl_list_begin(f->d, PT_GL_SCRATCH_WOKEN, PT_BIND_fill_woken, tiles);
     if (result != PATINA_OK)
         return result;
-    pt_gl_zero(f->d, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name, 0, WALKS * PT_GL_LIST_HEAD);
+    tell_tiles(f);
+    pt_gl_zero(f->d, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name, 0, WALKS_SIZE);
     if (refills)
         result = pt_gl_clear(f->d, f->d->scratch[PT_GL_SCRATCH_FILLED].name, 0, bits, (const uint32_t[4]){0});
     return result == PATINA_OK ? pt_gl_check(f->d, "preparing to fill holes") : result;
@@ -93,11 +104,12 @@ static int walk(struct fill *f, enum program p, uint32_t head)
     return pt_gl_list_dispatch(f->d, PT_KERNEL_fill, p, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name, head * PT_GL_LIST_HEAD);
 }
 
-static int count(struct fill *f, uint32_t known)
+// In software; on a GPU the step has counted already.
+static int count(struct fill *f, enum listing listed)
 {
-    const GLuint program = f->d->programs[PT_KERNEL_fill][COUNT];
-    f->d->gl.ProgramUniform1ui(program, 0, known);
-    f->d->gl.ProgramUniform1ui(program, 3, f->d->tiles.columns * f->d->tiles.rows);
+    if (f->d->base.info.hardware)
+        return PATINA_OK;
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][COUNT], 0, (GLuint)listed);
     return pt_gl_dispatch(f->d, PT_KERNEL_fill, COUNT, 1, 1);
 }
 
@@ -120,10 +132,8 @@ static int fill_step(struct fill *f)
         result = walk(f, DECIDE, CHANGES);
     if (result == PATINA_OK)
         result = walk(f, APPLY, APPLIES);
-    if (result == PATINA_OK) {
-        f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][WAKE], 3, f->d->tiles.columns * f->d->tiles.rows);
+    if (result == PATINA_OK)
         result = walk(f, WAKE, TILES);
-    }
     return result == PATINA_OK ? count(f, WOKEN) : result;
 }
 
@@ -139,11 +149,9 @@ static int is_over(struct fill *f, enum pt_gl_scratch_use use, uint32_t head)
 
 static int unfill_step(struct fill *f)
 {
-    int result = f->first ? count(f, SAVED) : PATINA_OK;
     f->d->stamp++;
-    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][MARK], 3, (GLuint)f->first);
-    if (result == PATINA_OK)
-        result = walk(f, MARK, f->first ? SAVES : LOOKS);
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][MARK], 4, (GLuint)f->first);
+    int result = walk(f, MARK, f->first ? SAVES : LOOKS);
     if (result == PATINA_OK)
         result = count(f, MARKED);
     if (result == PATINA_OK)

@@ -4,18 +4,12 @@
 
 #include <string.h>
 
-enum { TILE = 8, GROUP = 32, LISTS = 2, GROUPS_IN_ROW = 16384 }; // as in lib/tiles.glsl
+enum { TILE = 8, GROUP = 32, LISTS = 2 }; // as in lib/tiles.glsl
 
 void pt_gl_tiles_forget(struct pt_gl_device *d)
 {
     d->tiles.valid = 0;
     d->shown = 0;
-}
-
-void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y)
-{
-    *x = count < GROUPS_IN_ROW ? count : GROUPS_IN_ROW;
-    *y = *x ? (count + *x - 1) / *x : 0;
 }
 
 static int programs(struct pt_gl_device *d)

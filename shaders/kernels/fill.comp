@@ -8,7 +8,9 @@
 // it never shows.
 //   STEP 0: find the pixels to fill, empty or OCCLUDED ones (2: above level 0);   STEP 1: what they become;
 //   STEP 2: apply;   STEP 3: the tiles for the next step;
-//   STEP 4: mark;   STEP 5: restore;   STEP 6: the entries for the next step;   STEP 7: how many workgroups walk what
+//   STEP 4: mark;   STEP 5: restore;   STEP 6: the entries for the next step;
+//   STEP 7: how many workgroups walk what a step has listed. On a GPU the last workgroup of that step does it; software's barriers
+//   cost more than a dispatch
 #version 430 core
 #include "shared/filling.h"
 #include "lib/math.glsl"
@@ -38,17 +40,21 @@ struct walk { // as an indirect dispatch takes it, and how many there are
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { fill_args args; };
 layout(std430, binding = BIND_keys) writeonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = BIND_from) writeonly buffer from_block { uint from[]; };
-layout(std430, binding = BIND_walks) buffer walks_block { walk changes, applies, saves, tiles, looks; };
+layout(std430, binding = BIND_walks) coherent buffer walks_block {
+    walk changes, applies, saves, tiles, looks;
+    uint finished; // workgroups of this step
+};
 layout(std430, binding = BIND_changed) buffer changed_block { change changed[]; };
 layout(std430, binding = BIND_saved) buffer saved_block { saved_pixel saved[]; };
 layout(std430, binding = BIND_filled) buffer filled_block { uint filled[]; }; // a bit a pixel: filled in this phase
 layout(std430, binding = BIND_stamps) buffer stamps_block { uint stamps[]; }; // a word a tile: the step it was listed for last
-layout(std430, binding = BIND_woken) buffer woken_block { walk wakes; uint woken[]; }; // tiles for the next step
+layout(std430, binding = BIND_woken) coherent buffer woken_block { walk wakes; uint woken[]; }; // tiles for the next step
 
-layout(location = 0) uniform uint known;   // STEP 7: see there
+layout(location = 0) uniform uint listed;  // STEP 7: by which step
 layout(location = 1) uniform uint stamp;   // of this step
 layout(location = 2) uniform uint columns; // tiles in a row
-layout(location = 3) uniform uint most;    // STEP 3, 7: tiles; STEP 4: 1: look at all
+layout(location = 3) uniform uint most;    // STEP 0, 3, 7: tiles
+layout(location = 4) uniform uint all;     // STEP 4: 1: look at all
 layout(location = 5) uniform uint phase;   // STEP 1, 2, 4: PT_FILL_*
 
 // The ring, anticlockwise from east.
@@ -136,7 +142,7 @@ bool candidate(view_args view, uint pixel, float z, out float threshold)
 #endif
 }
 
-void main()
+void walk_list()
 {
     view_args view = args.view;
     ivec2 size = ivec2(view.width, view.height);
@@ -174,43 +180,7 @@ void main()
     }
 }
 
-#elif STEP == 7
-
-// How many workgroups of 64 there are for so many.
-void count_groups(inout walk w, uint count)
-{
-    uint groups = (count + 63u) / 64u, in_row = min(groups, 16384u); // as in native/device_gl/tiles.c
-    w.x = in_row;
-    w.y = in_row != 0u ? (groups + in_row - 1u) / in_row : 0u;
-    w.z = 1u;
-}
-
-// Behind 0: what is to change was found; 1: tiles were woken; 2: filling, before the first is marked; 3: entries were marked;
-// 4: those to look at next were chosen. Lists that were walked begin anew.
-void main()
-{
-    bool some = changes.count != 0u;
-    if (known == 0u) {
-        count_groups(tiles, some ? most : 0u);
-        wakes.count = 0u;
-    } else if (known == 1u) {
-        count_groups(wakes, (wakes.count + 3u) / 4u * 64u); // four tiles each: lib/tiles.glsl
-    } else if (known == 2u) {
-        count_groups(saves, saves.count);
-    } else if (known == 3u) {
-        count_groups(saves, some ? saves.count : 0u);
-        looks.count = 0u;
-    } else {
-        count_groups(looks, looks.count);
-    }
-    count_groups(applies, known == 0u ? (changes.count + EACH - 1u) / EACH : 0u);
-    if (known == 0u || known == 3u)
-        count_groups(changes, changes.count);
-    else
-        changes.count = 0u;
-}
-
-#else
+#elif STEP != 7
 
 uint entry_index()
 {
@@ -286,7 +256,7 @@ float refined_z(view_args view, ivec2 place, ivec2 best, uint source, float z_q)
 }
 
 // 5. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
-void main()
+void walk_list()
 {
     view_args view = args.view;
     bool refined = args.refined != 0u, occluded = phase == PT_FILL_OCCLUDED, unfills = args.unfills != 0u;
@@ -317,7 +287,7 @@ void main()
 
 #elif STEP == 2
 
-void main()
+void walk_list()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
     uint width = args.view.width, group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
@@ -353,7 +323,7 @@ void main()
 
 #elif STEP == 3
 
-void main()
+void walk_list()
 {
     uint tile = entry_index();
     if (tile < most && stamps[tile] == stamp)
@@ -366,13 +336,13 @@ void main()
 // an entry whose pixel shows four consecutive white cells ...
 #if STEP == 4
 
-void main()
+void walk_list()
 {
     ivec2 size = ivec2(args.view.width, args.view.height);
     uint index = entry_index();
-    if (index >= (most != 0u ? saves.count : looks.count))
+    if (index >= (all != 0u ? saves.count : looks.count))
         return;
-    uint entry = most != 0u ? index : changed[index].id;
+    uint entry = all != 0u ? index : changed[index].id;
     saved_pixel s = saved[entry];
     if (s.pixel == NO_PIXEL) // restored
         return;
@@ -394,7 +364,7 @@ void main()
 // ... gets back what it was before the phase.
 #elif STEP == 5
 
-void main()
+void walk_list()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
     uint width = args.view.width, index = entry_index();
@@ -410,7 +380,7 @@ void main()
 
 #else
 
-void main()
+void walk_list()
 {
     uvec2 corner = uvec2(args.view.rect[0], args.view.rect[1]);
     uint width = args.view.width, index = entry_index();
@@ -423,4 +393,73 @@ void main()
 
 #endif
 #endif
+#endif
+
+// ---- how many workgroups walk what ----------------------------------------------------------------------------------------
+
+#ifdef PT_SOFTWARE
+#define COUNTS (STEP == 7)
+#else
+#define COUNTS (STEP == 0 || STEP == 3 || STEP == 4 || STEP == 6 || STEP == 7)
+#endif
+
+#if COUNTS
+
+// How many workgroups of 64 there are for so many.
+void count_groups(inout walk w, uint count)
+{
+    uint groups = (count + 63u) / 64u, in_row = min(groups, 16384u); // as in native/device_gl/bind.c
+    w.x = in_row;
+    w.y = in_row != 0u ? (groups + in_row - 1u) / in_row : 0u;
+    w.z = 1u;
+}
+
+// Of what that step listed. Lists that were walked begin anew; who lists nothing leaves nothing to walk until something is listed again.
+void count_lists(uint step)
+{
+    uint found = changes.count, woken_count = wakes.count, chosen = looks.count;
+    bool finds = step == 0u || step == 4u;
+    count_groups(applies, step == 0u ? (found + EACH - 1u) / EACH : 0u);
+    count_groups(changes, finds ? found : 0u);
+    changes.count = finds ? found : 0u;
+    if (step == 0u) {
+        count_groups(tiles, found != 0u ? most : 0u);
+        count_groups(wakes, 0u);
+        wakes.count = 0u;
+    } else if (step == 3u) {
+        count_groups(tiles, 0u);
+        count_groups(wakes, (woken_count + 3u) / 4u * 64u); // four tiles each: lib/tiles.glsl
+        count_groups(saves, saves.count);
+    } else if (step == 4u) {
+        count_groups(saves, found != 0u ? saves.count : 0u);
+        count_groups(looks, 0u);
+        looks.count = 0u;
+    } else {
+        count_groups(looks, chosen);
+        count_groups(saves, chosen != 0u ? saves.count : 0u);
+    }
+}
+
+#endif
+
+#if STEP == 7
+
+void main() { count_lists(listed); }
+
+#else
+
+void main()
+{
+    walk_list();
+#if COUNTS
+    memoryBarrierBuffer();
+    barrier();
+    if (gl_LocalInvocationIndex == 0u && atomicAdd(finished, 1u) + 1u == gl_NumWorkGroups.x * gl_NumWorkGroups.y) {
+        memoryBarrierBuffer();
+        count_lists(uint(STEP));
+        finished = 0u;
+    }
+#endif
+}
+
 #endif

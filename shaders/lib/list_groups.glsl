@@ -4,7 +4,7 @@
 #version 430 core
 layout(local_size_x = 1) in;
 
-#define GROUPS_IN_ROW 16384u // as in native/device_gl/tiles.c: within every driver's limits
+#define GROUPS_IN_ROW 16384u // as in native/device_gl/bind.c: within every driver's limits
 
 layout(std430, binding = BIND_list) buffer list_block { uint list[]; };
 
