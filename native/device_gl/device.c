@@ -158,6 +158,16 @@ static void make_srgb_table(struct pt_gl_device *d)
     d->gl.BindBufferBase(GL_UNIFORM_BUFFER, PT_UNIFORM_srgb, d->srgb);
 }
 
+// What memory.c copies from.
+static void make_helpers(struct pt_gl_device *d)
+{
+    static const uint32_t zeros[PT_GL_ZEROS / 4];
+    d->gl.GenBuffers(1, &d->upload);
+    d->gl.GenBuffers(1, &d->zeros);
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->zeros);
+    d->gl.BufferData(GL_COPY_WRITE_BUFFER, sizeof zeros, zeros, GL_STATIC_COPY);
+}
+
 static int open_context(struct pt_gl_device *d, void *unused)
 {
     (void)unused;
@@ -200,6 +210,7 @@ static int open_context(struct pt_gl_device *d, void *unused)
     d->gl.GenBuffers(1, &d->arguments);
     d->gl.GenTextures(PT_UNIT_COUNT, d->textures);
     make_srgb_table(d);
+    make_helpers(d);
     find_memory(d);
     info->key64 = (uint32_t)pt_gl_key64_works(d);
     return pt_gl_check(d, "opening the device");

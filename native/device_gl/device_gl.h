@@ -157,7 +157,7 @@ int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t 
 // memory.c
 // At least `size` bytes; keeps the first `keep` bytes when it has to grow.
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep);
-// words: 16 bytes; a shorter pattern repeats in them. Offset and size are multiples of 8, or size reaches the end.
+// words: 16 bytes; a shorter pattern repeats in them. Offset is a multiple of 8, and so is what is cleared: size is rounded up.
 int pt_gl_clear(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, const uint32_t words[4]);
 int pt_gl_write(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, const void *source);
 enum { PT_GL_ZEROS = 128 };

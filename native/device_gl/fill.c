@@ -46,7 +46,7 @@ static int programs(struct fill *f)
                                               "#define STEP 7\n"};
     int result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, f->find, definitions[f->find]);
     for (uint32_t p = DECIDE; p <= COUNT && result == PATINA_OK; p++)
-        if (f->args->unfills || p <= WAKE || p == COUNT)
+        if (p == COUNT ? !f->d->base.info.hardware : f->args->unfills || p <= WAKE)
             result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, p, definitions[p]);
     return result;
 }
@@ -140,7 +140,7 @@ static int fill_step(struct fill *f)
 // Whether the list of a head is empty: in software, which has done its work, so looking has nobody wait, and steps over nothing take time.
 static int is_over(struct fill *f, enum pt_gl_scratch_use use, uint32_t head)
 {
-    uint32_t walk[PT_GL_LIST_HEAD / 4];
+    uint32_t walk[PT_GL_LIST_HEAD / 4] = {0};
     if (f->d->base.info.hardware)
         return 0;
     pt_gl_read(f->d, f->d->scratch[use].name, head * PT_GL_LIST_HEAD, sizeof walk, walk);

@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+enum { PIECE = 1 << 24 }; // bytes that are written or read at one go
+
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep)
 {
     const GladGLContext *gl = &d->gl;
@@ -51,7 +53,7 @@ static int clear_mapped(struct pt_gl_device *d, size_t offset, size_t size, uint
 
 enum { CLEAR_GROUP = 256, CLEAR_EACH = 4, PAIR = 8 }; // as in lib/clear.glsl
 
-// One block's worth, in the arguments' place.
+// One block's worth, in the arguments' place: what else is bound stays.
 static int clear_block(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, const uint32_t words[4])
 {
     const size_t base = offset / d->alignment * d->alignment, pairs = (size + PAIR - 1) / PAIR; // buffers are padded
@@ -78,8 +80,8 @@ int pt_gl_clear(struct pt_gl_device *d, GLuint name, size_t offset, size_t size,
     d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, name);
     if (!d->base.info.hardware)
         return clear_mapped(d, offset, size, (uint64_t)words[1] << 32 | words[0], (uint64_t)words[3] << 32 | words[2]);
-    if (!d->clear_program && (result = pt_gl_program(d, "lib/clear.glsl", "", &d->clear_program)) == PATINA_OK)
-        d->gl.ShaderStorageBlockBinding(d->clear_program, 0, PT_BIND_arguments); // what else is bound stays
+    if (!d->clear_program)
+        result = pt_gl_program(d, "lib/clear.glsl", "", &d->clear_program);
     for (size_t at = 0; at < size && result == PATINA_OK; at += most)
         result = clear_block(d, name, offset + at, size - at < most ? size - at : most, words);
     d->gl.MemoryBarrier(PT_GL_BARRIERS);
@@ -96,38 +98,31 @@ int pt_gl_write(struct pt_gl_device *d, GLuint name, size_t offset, size_t size,
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
     if (!d->base.info.hardware) {
         gl->BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)size, source);
-    } else {
-        if (!d->upload)
-            gl->GenBuffers(1, &d->upload);
-        gl->BindBuffer(GL_COPY_READ_BUFFER, d->upload);
-        gl->BufferData(GL_COPY_READ_BUFFER, (GLsizeiptr)size, source, GL_STREAM_DRAW);
-        gl->CopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, (GLintptr)offset, (GLsizeiptr)size);
+        return pt_gl_check(d, "writing a buffer");
+    }
+    gl->BindBuffer(GL_COPY_READ_BUFFER, d->upload);
+    for (size_t at = 0; at < size; at += PIECE) {
+        const size_t some = size - at < PIECE ? size - at : PIECE;
+        gl->BufferData(GL_COPY_READ_BUFFER, (GLsizeiptr)some, (const char *)source + at, GL_STREAM_DRAW);
+        gl->CopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, (GLintptr)(offset + at), (GLsizeiptr)some);
     }
     return pt_gl_check(d, "writing a buffer");
 }
 
-static const uint32_t nothing[PT_GL_ZEROS / 4];
-
 void pt_gl_zero(struct pt_gl_device *d, GLuint name, size_t offset, size_t size)
 {
+    static const uint32_t zeros[PT_GL_ZEROS / 4];
     const GladGLContext *gl = &d->gl;
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
     if (!d->base.info.hardware) {
-        gl->BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)size, nothing);
+        gl->BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)size, zeros);
         return;
     }
-    const int made = d->zeros != 0;
-    if (!made)
-        gl->GenBuffers(1, &d->zeros);
     gl->BindBuffer(GL_COPY_READ_BUFFER, d->zeros);
-    if (!made)
-        gl->BufferData(GL_COPY_READ_BUFFER, sizeof nothing, nothing, GL_STATIC_COPY);
     gl->CopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, (GLintptr)offset, (GLsizeiptr)size);
 }
 
 // ---- reading back ----------------------------------------------------------------------------------------------------
-
-enum { READ_AT_ONCE = 1 << 24 };
 
 // By a copy that the device makes: a driver was seen to hand out, of a buffer that had been read before, what had been there then,
 // though kernels had written since; and of memory made for reading, the host reads faster.
@@ -148,7 +143,7 @@ static int read_piece(struct pt_gl_device *d, GLuint name, size_t offset, size_t
 int pt_gl_read(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, void *target)
 {
     const GladGLContext *gl = &d->gl;
-    const size_t room = size < READ_AT_ONCE ? size : READ_AT_ONCE;
+    const size_t room = size < PIECE ? size : PIECE;
     int result = PATINA_OK;
     gl->MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     if (!d->base.info.hardware) {
@@ -164,7 +159,7 @@ int pt_gl_read(struct pt_gl_device *d, GLuint name, size_t offset, size_t size, 
         result = pt_gl_check(d, "making room to read a buffer back");
         d->staging.size = result == PATINA_OK ? room : 0;
     }
-    for (size_t at = 0; at < size && result == PATINA_OK; at += READ_AT_ONCE)
-        result = read_piece(d, name, offset + at, size - at < READ_AT_ONCE ? size - at : READ_AT_ONCE, (char *)target + at);
+    for (size_t at = 0; at < size && result == PATINA_OK; at += PIECE)
+        result = read_piece(d, name, offset + at, size - at < PIECE ? size - at : PIECE, (char *)target + at);
     return result;
 }

@@ -33,7 +33,7 @@ enum { TOLD = 64, ENTRY = 8, STATE = 32 }; // bytes: what is counted; an entry o
 enum { SORTED_AT_ONCE = 1 << 16 };         // entries of a list: 17 * 8 rounds of 128 steps
 enum { STEPS = 60000 };                    // through loops, that llvmpipe takes: it ends them beyond 65,535
 enum { LIST = PT_GL_LIST_HEAD + 4 * RUN }; // bytes of a list of tiles; there are two, as in soft.comp
-enum { LOOK = 16 };                        // parts before it is looked whether others follow; then as many again
+enum { LOOK = 16, LOOK_MOST = 64 }; // parts before it is looked whether others follow; then as many again, at most that many
 
 struct soft {
     const struct pt_gl_work *work;
@@ -182,7 +182,7 @@ static int draw_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t 
         if (result != PATINA_OK || part + 1 < look || part + 1 == most)
             continue;
         result = is_over(d, (uint32_t)part, &over);
-        look = d->base.info.hardware ? 2 * look : look + 1;
+        look += !d->base.info.hardware ? 1 : look < LOOK_MOST ? look : LOOK_MOST;
     }
     return result;
 }

@@ -5,7 +5,7 @@ layout(local_size_x = 256) in;
 
 #define EACH 4u // pairs of words that an invocation writes, as in native/device_gl/memory.c
 
-layout(std430, binding = BIND_cleared) writeonly buffer cleared_block { uvec2 cleared[]; };
+layout(std430, binding = BIND_arguments) writeonly buffer cleared_block { uvec2 cleared[]; };
 
 layout(location = 0) uniform uvec4 words;
 layout(location = 1) uniform uvec2 range; // where it begins, and how many pairs
