@@ -191,6 +191,8 @@ def for_cloud(packed: str, count: int) -> Edits | None:
 
 def notice(name: str, state: State, cloud: native.Cloud) -> str:
     """What is wrong with an object's edits, for the artist; then the cloud is shown whole."""
+    if cloud.stream and state:
+        return f"'{name}': its points are read as needed, and neither hidden nor graded: Linked File > Read Whole does that"
     try:
         for_cloud(state.packed, cloud.count)
     except Damaged as damaged:
@@ -208,6 +210,8 @@ _scans: weakref.WeakKeyDictionary[native.Cloud, np.ndarray | None] = weakref.Wea
 
 def mask_of(cloud: native.Cloud, state: State) -> Mask | None:
     """Any thread."""
+    if cloud.stream:  # a notice has said so
+        return None
     try:
         found = for_cloud(state.packed, cloud.count)
     except Damaged:
@@ -238,7 +242,7 @@ def has_selection(cloud: native.Cloud, state: State) -> bool:
 
 def grade_of(cloud: native.Cloud, state: State) -> Grade | None:
     """Any thread. None where there is nothing to grade."""
-    if not state.grades or not cloud.has_colors:
+    if not state.grades or not cloud.has_colors or cloud.stream:
         return None
     scans, known = scans_of(cloud), dict(state.grades)
     if cloud.scan_file and scans is None:

@@ -36,6 +36,8 @@ class Soft:
 
     def missing(self, cloud: native.Cloud) -> str:
         """What the cloud lacks for it, for the artist; "": nothing."""
+        if cloud.stream and self.by != 'ALL':
+            return "whole cloud, being read as needed (Linked File > Read Whole),"
         lacks = {'ATTRIBUTE': cloud.numbers is None and not cloud.has_scalars, 'LUMINANCE': not cloud.has_colors,
                  'CLASSES': not cloud.has_classes, 'DISTANCE': not self.placed}
         return _MISSING[self.by].format(name=self.name) if lacks.get(self.by) else ""

@@ -5,7 +5,7 @@
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "base/progress.h"
-#include "parts.h"
+#include "paged.h"
 #include "shared/words.h"
 
 #include <math.h>
@@ -173,17 +173,20 @@ int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbou
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT,
                        "patina_cloud_neighbourhoods: cloud or wanted is NULL");
     int error = pt_take(&cloud->handle, "patina_cloud_neighbourhoods", given, &taken, sizeof taken);
-    if (error || (error = pt_parts_refuse(cloud, "patina_cloud_neighbourhoods")))
+    if (error)
         return error;
     const int walks = wanted->numbers || wanted->distances || wanted->soft_radius || wanted->uncertainty;
     if (walks && (wanted->neighbours < 1 || wanted->neighbours > PT_NEIGHBOURS_MOST))
         return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT, "patina_cloud_neighbourhoods: neighbours: 1 to %d, not %u",
                        PT_NEIGHBOURS_MOST, wanted->neighbours);
+    if ((error = pt_whole_enter(cloud, "patina_cloud_neighbourhoods")))
+        return error;
     struct reading reading = {.cloud = cloud, .wanted = wanted, .progress = progress};
     struct pt_pool *pool = pt_pool_create(wanted->threads, 0);
     clear(wanted, cloud->info.count);
     error = pool ? read_all(&reading, pool) : PATINA_ERROR_MEMORY;
     pt_pool_destroy(pool);
+    pt_paged_leave(cloud);
     if (!error)
         pt_progress_set(progress, 1.0);
     return error ? pt_fail(&cloud->handle, error,

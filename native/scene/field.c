@@ -9,7 +9,7 @@
 #include "base/platform.h"
 #include "base/pool.h"
 #include "fingerprint.h"
-#include "parts.h"
+#include "paged.h"
 #include "base/elementary.h"
 
 #include <float.h>
@@ -252,21 +252,17 @@ static int fill_field(struct fill *fill, patina_progress *progress)
     return error;
 }
 
-int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc, patina_progress *progress, patina_field **out)
+static int make_field(const patina_cloud *cloud, patina_field_desc *desc, patina_progress *progress, patina_field **out)
 {
-    patina_field_desc checked;
-    if (!cloud || !out || cloud->handle.magic != PT_MAGIC)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: cloud or out is NULL, or the cloud destroyed");
-    *out = NULL;
-    int error = pt_take(NULL, "patina_field_create", desc, &checked, sizeof checked);
-    if (error || (error = pt_parts_refuse(cloud, "patina_field_create")) || (error = check(cloud, &checked)))
+    int error = check(cloud, desc);
+    if (error)
         return error;
     struct fill fill = {.cloud = cloud,
-                        .desc = &checked,
-                        .values = checked.values,
+                        .desc = desc,
+                        .values = desc->values,
                         .field = field_begin(cloud),
                         .numbers = calloc(cloud->slots + 1, sizeof *fill.numbers)};
-    if (checked.source == PATINA_FIELD_DISTANCE && !place_shape(&fill))
+    if (desc->source == PATINA_FIELD_DISTANCE && !place_shape(&fill))
         error = pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: the shape is flat");
     else if ((error = fill_field(&fill, progress)) == PATINA_ERROR_MEMORY)
         pt_fail(NULL, error, "a field of %llu points: out of memory", (unsigned long long)cloud->info.count);
@@ -275,6 +271,20 @@ int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc
         patina_field_destroy(fill.field);
     else
         *out = fill.field;
+    return error;
+}
+
+int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc, patina_progress *progress, patina_field **out)
+{
+    patina_field_desc checked;
+    if (!cloud || !out || cloud->handle.magic != PT_MAGIC)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: cloud or out is NULL, or the cloud destroyed");
+    *out = NULL;
+    int error = pt_take(NULL, "patina_field_create", desc, &checked, sizeof checked);
+    if (error || (error = pt_whole_enter(cloud, "patina_field_create")))
+        return error;
+    error = make_field(cloud, &checked, progress, out);
+    pt_paged_leave(cloud);
     return error;
 }
 

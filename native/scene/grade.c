@@ -6,7 +6,7 @@
 #include "base/color.h"
 #include "base/platform.h"
 #include "base/elementary.h"
-#include "parts.h"
+#include "paged.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -116,9 +116,6 @@ static int check(const patina_cloud *cloud, const patina_scan_grade *grades, con
     if (!cloud || cloud->handle.magic != PT_MAGIC || !grades || !count || count > MOST_SCANS)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: a cloud that was destroyed, or not 1 to %d scans",
                        MOST_SCANS);
-    const int refused = pt_parts_refuse(cloud, "patina_grade_create");
-    if (refused)
-        return refused;
     if (!cloud->colors)
         return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "patina_grade_create: the cloud has no colours");
     for (uint32_t i = 0; i < count; i++) {
@@ -161,15 +158,9 @@ int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const 
     return patina_grade_create_balanced(cloud, scans, grades, NULL, count, out);
 }
 
-int patina_grade_create_balanced(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
-                                 const float *balance, uint32_t count, patina_grade **out)
+static int make_grade(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades, const float *balance,
+                      uint32_t count, patina_grade **out)
 {
-    if (!out)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: out is NULL");
-    *out = NULL;
-    int error = check(cloud, grades, balance, count);
-    if (error)
-        return error;
     struct patina_grade *grade = calloc(1, sizeof *grade);
     struct pt_pool *pool = pt_pool_create(pt_pool_threads_for(0, cloud->slots), 0);
     struct grading grading = {.cloud = cloud, .scans = scans, .tone_count = count, .grade = grade};
@@ -193,6 +184,20 @@ int patina_grade_create_balanced(const patina_cloud *cloud, const uint16_t *scan
     return good ? PATINA_OK
                 : pt_fail(NULL, PATINA_ERROR_MEMORY, "colours of %llu points: out of memory",
                           (unsigned long long)cloud->info.count);
+}
+
+int patina_grade_create_balanced(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
+                                 const float *balance, uint32_t count, patina_grade **out)
+{
+    if (!out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: out is NULL");
+    *out = NULL;
+    int error = check(cloud, grades, balance, count);
+    if (error || (error = pt_whole_enter(cloud, "patina_grade_create")))
+        return error;
+    error = make_grade(cloud, scans, grades, balance, count, out);
+    pt_paged_leave(cloud);
+    return error;
 }
 
 void patina_grade_destroy(patina_grade *grade)

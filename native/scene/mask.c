@@ -3,7 +3,7 @@
 #include "mask.h"
 
 #include "base/platform.h"
-#include "parts.h"
+#include "paged.h"
 
 #include <stdlib.h>
 
@@ -48,15 +48,8 @@ static void sum_up(struct patina_mask *mask, uint32_t chunk_count)
         mask->hash = (mask->hash ^ (mask->words[i] & 0xFFFFu)) * 0x100000001B3ull; // FNV-1a
 }
 
-int patina_mask_create(const patina_cloud *cloud, const uint8_t *hidden, const uint8_t *selected, size_t size,
-                       patina_mask **out)
+static int make_mask(const patina_cloud *cloud, const uint8_t *hidden, const uint8_t *selected, size_t size, patina_mask **out)
 {
-    if (!cloud || !out || cloud->handle.magic != PT_MAGIC)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_mask_create: cloud or out is NULL, or the cloud destroyed");
-    *out = NULL;
-    const int refused = pt_parts_refuse(cloud, "patina_mask_create");
-    if (refused)
-        return refused;
     if (size != (cloud->info.count + 7) / 8)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_mask_create: %zu bytes for %llu points; it takes %llu", size,
                        (unsigned long long)cloud->info.count, (unsigned long long)((cloud->info.count + 7) / 8));
@@ -83,6 +76,20 @@ int patina_mask_create(const patina_cloud *cloud, const uint8_t *hidden, const u
     return good ? PATINA_OK
                 : pt_fail(NULL, PATINA_ERROR_MEMORY, "a mask of %llu points: out of memory",
                           (unsigned long long)cloud->info.count);
+}
+
+int patina_mask_create(const patina_cloud *cloud, const uint8_t *hidden, const uint8_t *selected, size_t size,
+                       patina_mask **out)
+{
+    if (!cloud || !out || cloud->handle.magic != PT_MAGIC)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_mask_create: cloud or out is NULL, or the cloud destroyed");
+    *out = NULL;
+    const int refused = pt_whole_enter(cloud, "patina_mask_create");
+    if (refused)
+        return refused;
+    const int error = make_mask(cloud, hidden, selected, size, out);
+    pt_paged_leave(cloud);
+    return error;
 }
 
 void patina_mask_destroy(patina_mask *mask)

@@ -6,6 +6,7 @@
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "fingerprint.h"
+#include "parts.h"
 #include "shared/view.h"
 #include "shared/words.h"
 
@@ -326,6 +327,18 @@ int pt_paged_refuse(const struct patina_cloud *cloud, const char *call)
     if (whole)
         return PATINA_OK;
     return pt_fail(&cloud->handle, PATINA_ERROR_UNSUPPORTED, "%s: points of the cloud are still on their way", call);
+}
+
+int pt_whole_enter(const struct patina_cloud *cloud, const char *call)
+{
+    int refused = pt_parts_refuse(cloud, call);
+    if (refused || (refused = pt_paged_refuse(cloud, call)))
+        return refused;
+    pt_paged_enter(cloud, 1);
+    if (pt_paged_whole(cloud))
+        return PATINA_OK;
+    pt_paged_leave(cloud); // pages were given back in between
+    return pt_fail(&cloud->handle, PATINA_ERROR_UNSUPPORTED, "%s: points of the cloud are not all there", call);
 }
 
 // ---- what plans want ---------------------------------------------------------------------------------------------------

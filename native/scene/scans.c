@@ -3,7 +3,7 @@
 
 #include "base/platform.h"
 #include "mask.h"
-#include "parts.h"
+#include "paged.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -78,14 +78,13 @@ static int check(const patina_cloud *cloud, const patina_scan *scans, uint32_t c
     if (!cloud || cloud->handle.magic != PT_MAGIC || !scans || !count || count > MOST_SCANS)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_scans_create: a cloud that was destroyed, or not 1 to %d scans",
                        MOST_SCANS);
-    const int refused = pt_parts_refuse(cloud, "patina_scans_create");
-    for (uint32_t i = 0; i < count && !refused; i++) {
+    for (uint32_t i = 0; i < count; i++) {
         const double *d = scans[i].direction;
         if (!isfinite(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) || !(scans[i].interval >= 0.0) || !isfinite(scans[i].interval))
             return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT,
                            "patina_scans_create: scan %u: its direction is not finite, or its interval not 0 or more", i);
     }
-    return refused;
+    return PATINA_OK;
 }
 
 static void take_scans(struct patina_scans *out, const patina_scan *scans)
@@ -117,15 +116,9 @@ static void take_points(struct patina_scans *out, const struct patina_cloud *clo
     }
 }
 
-int patina_scans_create(const patina_cloud *cloud, const uint16_t *scan, const patina_scan *scans, uint32_t count,
-                        patina_scans **out)
+static int make_scans(const struct patina_cloud *cloud, const uint16_t *scan, const patina_scan *scans, uint32_t count,
+                      patina_scans **out)
 {
-    if (!out)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_scans_create: out is NULL");
-    *out = NULL;
-    const int error = check(cloud, scans, count);
-    if (error)
-        return error;
     struct patina_scans *made = calloc(1, sizeof *made);
     if (made) {
         pt_handle_init(&made->handle);
@@ -145,6 +138,20 @@ int patina_scans_create(const patina_cloud *cloud, const uint16_t *scan, const p
     take_points(made, cloud, scan);
     *out = made;
     return PATINA_OK;
+}
+
+int patina_scans_create(const patina_cloud *cloud, const uint16_t *scan, const patina_scan *scans, uint32_t count,
+                        patina_scans **out)
+{
+    if (!out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_scans_create: out is NULL");
+    *out = NULL;
+    int error = check(cloud, scans, count);
+    if (error || (error = pt_whole_enter(cloud, "patina_scans_create")))
+        return error;
+    error = make_scans(cloud, scan, scans, count, out);
+    pt_paged_leave(cloud);
+    return error;
 }
 
 void patina_scans_destroy(patina_scans *scans)

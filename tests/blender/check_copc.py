@@ -15,7 +15,7 @@ from copc_files import claim, points_of, too_fine, write_copc
 from harness import SCRATCH, check, new_scene, render, reports, stats
 from mathutils import Matrix
 from patina import native, streaming
-from patina.sync import addresses, clouds, linked
+from patina.sync import addresses, clouds, edits, linked
 from range_server import Server
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
@@ -77,6 +77,23 @@ def test_same_picture_as_flat():
         stream = stream_of()
         check(0 < stream.arrived <= len(entries), f"{stream.arrived} pages of {len(entries)}")
         print(f"  {name}: {stream.arrived} of {len(entries)} pages")
+
+
+def test_what_asks_for_the_whole():
+    """Edits and fields are of all points: of those that come as needed pictures are drawn without, and say so."""
+    path, _, _ = made("edited.copc.laz")
+    clouds.CACHE.clear()
+    new_scene()
+    objects = import_copc(path, 'ON')
+    see(objects)
+    plain = render()
+    item = objects[0].patina.points.scans.add()
+    item.name, item.number, item.gain = "All points", edits.ALL, 4.0
+    objects[0].patina.soft.use, objects[0].patina.soft.by = True, 'LUMINANCE'
+    edited = render()
+    check(np.array_equal(plain["Combined"], edited["Combined"]), "the picture changed")
+    for word in ("neither hidden nor graded", "to be soft by"):
+        check(any(word in text for _, text in reports), f"{word}: {reports}")
 
 
 def test_only_what_is_seen():

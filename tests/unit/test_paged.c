@@ -142,8 +142,47 @@ static void test_billions(void **state)
     free(pages);
 }
 
+// What goes over all points asks for all of them: until the last page is there, it says so by the call's name.
+static void test_refused(void **state)
+{
+    (void)state;
+    enum { PAGES = 5 };
+    patina_page *pages = make_pages();
+    const patina_pages_desc desc = {.struct_size = sizeof desc, .pages = pages, .page_count = PAGES};
+    static uint8_t hidden[(PAGES * POINTS + 7) / 8];
+    static float values[PAGES * POINTS];
+    const patina_scan scan = {.interval = 0.0};
+    const patina_field_desc field = {
+        .struct_size = sizeof field, .source = PATINA_FIELD_VALUES, .count = PAGES * POINTS, .values = values};
+    const patina_neighbourhoods neighbourhoods = {.struct_size = sizeof neighbourhoods};
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_pages_begin(&desc, &cloud), NULL);
+    for (uint32_t given = 0; given <= PAGES; given++) {
+        const int expected = given < PAGES ? PATINA_ERROR_UNSUPPORTED : PATINA_OK;
+        patina_mask *mask = NULL;
+        patina_scans *scans = NULL;
+        patina_field *made = NULL;
+        assert_int_equal(patina_mask_create(cloud, hidden, NULL, sizeof hidden, &mask), expected);
+        assert_int_equal(patina_scans_create(cloud, NULL, &scan, 1, &scans), expected);
+        assert_int_equal(patina_cloud_neighbourhoods(cloud, &neighbourhoods, NULL), expected);
+        assert_int_equal(patina_field_create(cloud, &field, NULL, &made), expected);
+        if (expected) {
+            char text[256] = "";
+            patina_message(cloud, text, sizeof text);
+            assert_non_null(strstr(text, "patina_field_create: points of the cloud are still on their way"));
+        }
+        patina_mask_destroy(mask);
+        patina_scans_destroy(scans);
+        patina_field_destroy(made);
+        if (given < PAGES)
+            give(cloud, &pages[given], given);
+    }
+    patina_cloud_destroy(cloud);
+    free(pages);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_billions)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_billions), cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
