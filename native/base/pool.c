@@ -29,22 +29,28 @@ struct job {
     struct pt_pool *pool;
 };
 
+// Who is awake joins and leaves a job without the lock, which sixteen threads would queue for at each of a hundred steps. It is for those
+// who sleep: who is about to says so first and then looks once more, and who has news tells it first and then looks for sleepers.
 struct pt_pool {
     struct pt_mutex lock;
     struct pt_mutex caller; // one pt_parallel at a time
     struct pt_condition wake, done;
-    struct job *job;      // that helpers may join; NULL between two
-    struct range *ranges; // one a thread
-    _Atomic uint64_t generation;
-    atomic_uint running; // helpers that joined it and are not done
+    struct job *job;                          // the latest
+    struct range *ranges;                     // one a thread
+    _Alignas(64) _Atomic uint64_t generation; // of the job
+    _Alignas(64) atomic_uint inside;          // OPEN: helpers may join the job; and how many have and are not done
+    _Alignas(64) atomic_uint asleep;          // helpers
+    atomic_int waits;                         // the caller sleeps until nobody is inside
+    atomic_int quit;
     uint32_t spins;
     uint32_t threads, batch;
-    int quit;
     void (*look)(void *context); // NULL: nobody watches
     void *watched;
     struct pt_thread helpers[MAX_THREADS];
     uint32_t started;
 };
+
+enum { OPEN = 1 << 30 }; // of inside
 
 struct helper_start {
     struct pt_pool *pool;
@@ -109,38 +115,58 @@ static void pause_a_moment(void)
 #endif
 }
 
+// Until there is a job behind the one seen.
+static void await_job(struct pt_pool *pool, uint64_t seen)
+{
+    for (uint32_t i = 0; i < pool->spins; i++) {
+        if (atomic_load_explicit(&pool->generation, memory_order_acquire) != seen)
+            return;
+        pause_a_moment();
+    }
+    pt_mutex_lock(&pool->lock);
+    atomic_fetch_add(&pool->asleep, 1);
+    while (!atomic_load(&pool->quit) && atomic_load(&pool->generation) == seen)
+        pt_condition_wait(&pool->wake, &pool->lock);
+    atomic_fetch_sub(&pool->asleep, 1);
+    pt_mutex_unlock(&pool->lock);
+}
+
+static int join(struct pt_pool *pool)
+{
+    uint32_t inside = atomic_load(&pool->inside);
+    while (inside & OPEN)
+        if (atomic_compare_exchange_weak(&pool->inside, &inside, inside + 1))
+            return 1;
+    return 0;
+}
+
+static void leave(struct pt_pool *pool)
+{
+    if (atomic_fetch_sub(&pool->inside, 1) != 1 || !atomic_load(&pool->waits))
+        return;
+    pt_mutex_lock(&pool->lock);
+    pt_condition_wake_one(&pool->done);
+    pt_mutex_unlock(&pool->lock);
+}
+
 static void helper_main(void *argument)
 {
     struct helper_start start = *(struct helper_start *)argument;
     free(argument);
     struct pt_pool *pool = start.pool;
-    uint64_t seen = 0;
-    for (;;) {
-        for (uint32_t i = 0; i < pool->spins && atomic_load_explicit(&pool->generation, memory_order_acquire) == seen; i++)
-            pause_a_moment();
-        pt_mutex_lock(&pool->lock);
-        while (!pool->quit && pool->generation == seen)
-            pt_condition_wait(&pool->wake, &pool->lock);
-        if (pool->quit)
-            break;
-        seen = pool->generation;
-        struct job *job = pool->job;
-        pool->running += job != NULL;
-        pt_mutex_unlock(&pool->lock);
-        if (!job)
+    for (uint64_t seen = 0; !atomic_load(&pool->quit);) {
+        await_job(pool, seen);
+        seen = atomic_load(&pool->generation);
+        if (!join(pool))
             continue;
-        take_part(job, start.thread);
-        pt_mutex_lock(&pool->lock);
-        if (atomic_fetch_sub(&pool->running, 1) == 1)
-            pt_condition_wake_one(&pool->done);
-        pt_mutex_unlock(&pool->lock);
+        take_part(pool->job, start.thread);
+        leave(pool);
     }
-    pt_mutex_unlock(&pool->lock);
 }
 
 struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
 {
-    struct pt_pool *pool = calloc(1, sizeof *pool);
+    struct pt_pool *pool = pt_pages_alloc(sizeof *pool); // aligned, and zeros
     if (!pool)
         return NULL;
     pool->threads = threads ? threads : pt_core_count();
@@ -149,7 +175,7 @@ struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
     pool->batch = batch;
     pool->ranges = pt_pages_alloc(pool->threads * sizeof *pool->ranges);
     if (!pool->ranges) {
-        free(pool);
+        pt_pages_free(pool, sizeof *pool);
         return NULL;
     }
     pool->spins = pool->threads <= pt_core_count() ? SPINS : 0;
@@ -176,7 +202,7 @@ void pt_pool_destroy(struct pt_pool *pool)
     if (!pool)
         return;
     pt_mutex_lock(&pool->lock);
-    pool->quit = 1;
+    atomic_store(&pool->quit, 1);
     pt_condition_wake_all(&pool->wake);
     pt_mutex_unlock(&pool->lock);
     for (uint32_t i = 0; i < pool->started; i++)
@@ -186,7 +212,7 @@ void pt_pool_destroy(struct pt_pool *pool)
     pt_mutex_destroy(&pool->caller);
     pt_mutex_destroy(&pool->lock);
     pt_pages_free(pool->ranges, pool->threads * sizeof *pool->ranges);
-    free(pool);
+    pt_pages_free(pool, sizeof *pool);
 }
 
 void pt_pool_watch(struct pt_pool *pool, void (*look)(void *context), void *context)
@@ -202,6 +228,35 @@ void pt_pool_look(struct pt_pool *pool)
 }
 
 uint32_t pt_pool_threads(const struct pt_pool *pool) { return pool ? pool->threads : 1; }
+
+static void open_job(struct pt_pool *pool, struct job *job)
+{
+    pool->job = job;
+    atomic_store(&pool->inside, OPEN);
+    atomic_fetch_add(&pool->generation, 1);
+    if (!atomic_load(&pool->asleep))
+        return;
+    pt_mutex_lock(&pool->lock);
+    pt_condition_wake_all(&pool->wake);
+    pt_mutex_unlock(&pool->lock);
+}
+
+// Who still sleeps is not waited for: nothing is left to do.
+static void close_job(struct pt_pool *pool)
+{
+    atomic_fetch_and(&pool->inside, ~(uint32_t)OPEN);
+    for (uint32_t i = 0; i < pool->spins; i++) {
+        if (!atomic_load_explicit(&pool->inside, memory_order_acquire))
+            return;
+        pause_a_moment();
+    }
+    pt_mutex_lock(&pool->lock);
+    atomic_store(&pool->waits, 1);
+    while (atomic_load(&pool->inside))
+        pt_condition_wait(&pool->done, &pool->lock);
+    atomic_store(&pool->waits, 0);
+    pt_mutex_unlock(&pool->lock);
+}
 
 void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *work, void *context)
 {
@@ -224,19 +279,9 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
             span_of((uint32_t)((uint64_t)items * t / pool->threads), (uint32_t)((uint64_t)items * (t + 1) / pool->threads)),
             memory_order_relaxed);
     if (items > grain) {
-        pt_mutex_lock(&pool->lock);
-        pool->job = &job;
-        pool->generation++;
-        pt_condition_wake_all(&pool->wake);
-        pt_mutex_unlock(&pool->lock);
+        open_job(pool, &job);
         take_part(&job, 0);
-        for (uint32_t i = 0; i < pool->spins && atomic_load_explicit(&pool->running, memory_order_acquire); i++)
-            pause_a_moment();
-        pt_mutex_lock(&pool->lock);
-        pool->job = NULL; // who still sleeps is not waited for: nothing is left to do
-        while (pool->running)
-            pt_condition_wait(&pool->done, &pool->lock);
-        pt_mutex_unlock(&pool->lock);
+        close_job(pool);
     } else {
         take_part(&job, 0);
     }
