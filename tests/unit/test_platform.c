@@ -48,8 +48,13 @@ static int choose_folder(void)
     wchar_t temporary[256];
     GetTempPathW(256, temporary);
     WideCharToMultiByte(CP_UTF8, 0, temporary, -1, folder, 300, NULL, NULL);
-    snprintf(folder + strlen(folder), 64, "patina-platform-%lu", (unsigned long)GetCurrentProcessId());
-    return make_folder(folder);
+    char *name = folder + strlen(folder);
+    int taken = 1;
+    for (int i = 0; i < 100 && taken; i++) { // a killed process may have left one, whose number comes again
+        snprintf(name, 64, "patina-platform-%lu-%d", (unsigned long)GetCurrentProcessId(), i);
+        taken = make_folder(folder);
+    }
+    return taken;
 }
 static int takes_signals(void) { return 0; }
 static const char mathematics[] = "ucrtbase.dll";
@@ -493,7 +498,8 @@ int main(void)
     if (choose_folder())
         return 1;
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    for (const char *const *name = (const char *const[]){"pipe", "été 测试", "large", "kept", "returned", NULL}; *name; name++)
+    for (const char *const *name = (const char *const[]){"pipe", "été 测试", "small", "large", "kept", "returned", NULL}; *name;
+         name++)
         pt_file_remove(at(*name));
     remove_folder(folder);
     return failed;
