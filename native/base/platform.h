@@ -84,9 +84,12 @@ const char *pt_error_text(int error, char *buffer, size_t size); // buffer: wher
 // Large arrays come straight from the system: they go back to it when freed, and huge pages halve a scatter's TLB misses.
 // Zeroed, page-aligned. NULL when memory lacks. size 0 gives a valid pointer.
 void *pt_pages_alloc(size_t size);
-// The same for arrays that are filled here and there: no more is taken than what is written to (Windows: is promised whole). What is
-// forgotten goes back to the system, but for what shares a page with its neighbours, and holds anything afterwards.
+// The same for arrays that are filled here and there: no more is taken than what is written to. What is needed is asked for before anything
+// reads or writes it: Windows promises memory for that alone, other systems for all there is. Any part of an array, as often as one likes;
+// returns ENOMEM where memory lacks. What is forgotten goes back to the system, but for what shares a page with its neighbours, must be
+// needed again, and holds anything then.
 void *pt_pages_reserve(size_t size);
+int pt_pages_need(void *pages, size_t size);
 void pt_pages_forget(void *pages, size_t size);
 void pt_pages_free(void *pages,
                    size_t size); // of pt_pages_alloc, pt_pages_reserve or pt_disk_map, NULL is fine; size as asked for

@@ -195,14 +195,22 @@ void *pt_pages_alloc(size_t size)
     return size > SIZE_MAX / 2 ? NULL : VirtualAlloc(NULL, size ? size : 1, MEM_RESERVE | MEM_COMMIT, PAGE_READWRITE);
 }
 
-void *pt_pages_reserve(size_t size) { return pt_pages_alloc(size); }
+void *pt_pages_reserve(size_t size)
+{
+    return size > SIZE_MAX / 2 ? NULL : VirtualAlloc(NULL, size ? size : 1, MEM_RESERVE, PAGE_READWRITE);
+}
+
+int pt_pages_need(void *pages, size_t size)
+{
+    return !size || VirtualAlloc(pages, size, MEM_COMMIT, PAGE_READWRITE) ? 0 : ENOMEM; // what is there already stays as it is
+}
 
 void pt_pages_forget(void *pages, size_t size)
 {
     const uintptr_t page = 4096, first = ((uintptr_t)pages + page - 1) / page * page,
                     end = ((uintptr_t)pages + size) / page * page;
     if (end > first)
-        VirtualAlloc((void *)first, end - first, MEM_RESET, PAGE_READWRITE);
+        VirtualFree((void *)first, end - first, MEM_DECOMMIT);
 }
 
 void pt_pages_free(void *pages, size_t size)

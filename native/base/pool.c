@@ -21,8 +21,8 @@ static uint32_t span_next(uint64_t span) { return (uint32_t)span; }
 static uint32_t span_end(uint64_t span) { return (uint32_t)(span >> 32); }
 static uint32_t span_left(uint64_t span) { return span_next(span) < span_end(span) ? span_end(span) - span_next(span) : 0; }
 
-struct job {
-    pt_work *work;
+struct job { // on the caller's stack, on a line that the caller's own variables do not lie on
+    _Alignas(64) pt_work *work;
     void *context;
     uint32_t grain, ranges;
     struct range *range;

@@ -3,6 +3,7 @@
 
 #include "page_check.h"
 #include "scene/mask.h"
+#include "scene/paged.h"
 #include "scene/soft.h"
 
 #include <stdlib.h>
@@ -33,8 +34,26 @@ static int as_now(const struct patina_device *device, const struct pt_buffer *bu
     return !device->copies || !buffer->size || (buffer->name == 0) == (device->ranges.most != 0);
 }
 
-static int give_points(struct patina_device *device, size_t size, const void *data, struct pt_buffer *out)
+// Of a cloud of which pages are absent, chunks that lie beside each other at one go: there need be no memory between them (scene/paged.h).
+static int give_chunks(struct patina_device *device, const struct patina_cloud *cloud, size_t each, const char *data,
+                       struct pt_buffer *out)
 {
+    int error = device->ops->buffer_create(device, cloud->slots * each, NULL, PT_COPY, out);
+    for (uint32_t c = pt_chunk_from(cloud, 0); c < cloud->chunk_count && !error; c = pt_chunk_from(cloud, c)) {
+        const size_t first = cloud->chunks[c].first;
+        size_t count = 0;
+        for (; c < cloud->chunk_count && cloud->chunks[c].count; c++)
+            count += cloud->chunks[c].padded;
+        error = device->ops->buffer_write(device, out, first * each, data + first * each, count * each);
+    }
+    return error;
+}
+
+static int give_points(struct patina_device *device, const struct patina_cloud *cloud, size_t size, const void *data,
+                       struct pt_buffer *out)
+{
+    if (device->copies && !device->ranges.most && pt_paged_absent(cloud))
+        return give_chunks(device, cloud, size / cloud->slots, data, out);
     return device->ops->buffer_create(device, size, data, how_points(device), out);
 }
 
@@ -60,12 +79,12 @@ static int upload_shapes(struct patina_device *device, const struct patina_cloud
     device->ops->buffer_destroy(device, &resident->buffers[PT_SHAPES]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_SIGHTS]);
     resident->shapes = atomic_load(&cloud->alive->shapes);
-    int error = give_points(device, cloud->slots * 4, cloud->surfels, &resident->buffers[PT_SURFELS]);
+    int error = give_points(device, cloud, cloud->slots * 4, cloud->surfels, &resident->buffers[PT_SURFELS]);
     if (!error && cloud->radii && cloud->shapes)
-        error = give_points(device, cloud->slots * 4, cloud->shapes, &resident->buffers[PT_SHAPES]);
+        error = give_points(device, cloud, cloud->slots * 4, cloud->shapes, &resident->buffers[PT_SHAPES]);
     if (error || !radii)
         return error;
-    return give_points(device, cloud->slots * 4, radii, &resident->buffers[PT_RADII]);
+    return give_points(device, cloud, cloud->slots * 4, radii, &resident->buffers[PT_RADII]);
 }
 
 // The colours and scalars as they are now, in place of what the buffer holds.
@@ -74,13 +93,15 @@ static int upload_colors(struct patina_device *device, const struct patina_cloud
     device->ops->buffer_destroy(device, &resident->buffers[PT_COLORS]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_SCALARS]);
     resident->colors = atomic_load(&cloud->alive->colors);
-    int error = !cloud->scalars ? PATINA_OK
-                                : give_points(device, pt_scalar_bytes(cloud), cloud->scalars, &resident->buffers[PT_SCALARS]);
+    int error = !cloud->scalars
+                    ? PATINA_OK
+                    : give_points(device, cloud, pt_scalar_bytes(cloud), cloud->scalars, &resident->buffers[PT_SCALARS]);
     if (error)
         return error;
     if (!cloud->colors)
         return PATINA_OK;
-    return give_points(device, cloud->slots * pt_color_size(cloud->color_format), cloud->colors, &resident->buffers[PT_COLORS]);
+    return give_points(device, cloud, cloud->slots * pt_color_size(cloud->color_format), cloud->colors,
+                       &resident->buffers[PT_COLORS]);
 }
 
 static int upload_all(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
@@ -98,7 +119,7 @@ static int upload_all(struct patina_device *device, const struct patina_cloud *c
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         if (!parts[i].data)
             continue;
-        error = give_points(device, parts[i].size, parts[i].data, &resident->buffers[parts[i].which]);
+        error = give_points(device, cloud, parts[i].size, parts[i].data, &resident->buffers[parts[i].which]);
         if (error)
             return error;
     }
@@ -200,11 +221,12 @@ int pt_residency_mark(struct patina_device *device, const struct patina_cloud *c
     char *words = malloc(cloud->slots * size);
     if (!words)
         return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "showing free space: out of memory");
-    for (uint64_t slot = 0; slot < cloud->slots; slot++) {
-        const int marked = cloud->shapes && (cloud->shapes[slot] & PT_SHAPE_SEEN_THROUGH);
-        const void *own = cloud->colors ? (const char *)cloud->colors + slot * size : (const void *)grey;
-        memcpy(words + slot * size, marked ? mark : own, size);
-    }
+    for (uint32_t c = pt_chunk_from(cloud, 0); c < cloud->chunk_count; c = pt_chunk_from(cloud, c + 1))
+        for (uint64_t slot = cloud->chunks[c].first, end = slot + cloud->chunks[c].padded; slot < end; slot++) {
+            const int marked = cloud->shapes && (cloud->shapes[slot] & PT_SHAPE_SEEN_THROUGH);
+            const void *own = cloud->colors ? (const char *)cloud->colors + slot * size : (const void *)grey;
+            memcpy(words + slot * size, marked ? mark : own, size);
+        }
     int error = device->ops->buffer_create(device, cloud->slots * size, words, how_points(device) & PT_IN_RANGES,
                                            &resident->marked);
     free(words);
@@ -282,7 +304,7 @@ int pt_residency_take_points(struct pt_residency *residency, struct patina_devic
     if (!resident && !(resident = begin(device, alive)))
         return PATINA_ERROR_MEMORY;
     drop(device, resident);
-    const int error = give_points(device, size, data, &resident->buffers[0]);
+    const int error = device->ops->buffer_create(device, size, data, how_points(device), &resident->buffers[0]);
     return there ? error : end(residency, device, resident, error, out);
 }
 

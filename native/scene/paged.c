@@ -139,14 +139,7 @@ static void drop_page(struct patina_cloud *cloud, uint32_t p)
 {
     struct pt_paged *paged = cloud->paged;
     struct pt_page *page = &paged->pages[p];
-    struct pt_section sections[PT_ARRAYS];
-    pt_cloud_sections(cloud, sections);
-    static const enum pt_array points[] = {PT_ARRAY_POSITIONS, PT_ARRAY_ORDER,   PT_ARRAY_SURFELS,
-                                           PT_ARRAY_COLORS,    PT_ARRAY_SCALARS, PT_ARRAY_CLASSES};
-    const uint32_t bytes[] = {12, 4, 4, (uint32_t)pt_color_size(cloud->color_format), 4, 1};
-    for (size_t i = 0; i < sizeof points / sizeof *points; i++)
-        if (sections[points[i]].size)
-            pt_pages_forget((char *)*sections[points[i]].data + page->first_slot * bytes[i], page->slots * bytes[i]);
+    pt_page_forget(cloud, page);
     pt_arrived_free(page);
     memset(cloud->chunks + page->first_chunk, 0, page->chunk_count * sizeof *cloud->chunks);
     paged->held -= page->slots * bytes_of_point(cloud);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Clouds whose points arrive page by page (pages.h of include/, SPEC 14). A page is one or more chunks, whose slots are reserved from its
-// count. Pages are copied into their slots at any time: no picture reads slots of chunks that are not there. The table of chunks is reserved,
-// too, and changes only where a picture begins and no other is drawn: an absent page has no entries in it, whoever goes over chunks goes by
-// pt_chunk_from, and sees absent pages as boxes (pt_page_first).
+// count. Pages are copied into their slots at any time: nobody reads slots of chunks that are not there, but for a part's first, and there need
+// be no memory for them. The table of chunks is reserved, too, and changes only where a picture begins and no other is drawn: an absent page has
+// no entries in it, whoever goes over chunks goes by pt_chunk_from, and sees absent pages as boxes (pt_page_first).
 #ifndef PT_PAGED_H
 #define PT_PAGED_H
 

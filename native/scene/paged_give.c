@@ -92,7 +92,7 @@ int patina_cloud_page_give(patina_cloud *cloud, uint32_t index, const patina_clo
     error = error      ? pt_fail_again(&cloud->handle, error)
             : !arrived ? pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "page %u: out of memory", index)
                        : check_page(cloud, index, made);
-    if (!error) {
+    if (!error && !(error = pt_page_need(cloud, index))) {
         copy_page(cloud, page, made);
         *arrived = (struct pt_arrived){.chunks = made->chunks, .info = made->info};
         page->arrived = arrived;
@@ -174,16 +174,6 @@ static void lay_out(struct patina_cloud *cloud, const patina_pages_desc *desc)
     }
 }
 
-static int take_arrays(struct patina_cloud *cloud)
-{
-    struct pt_section sections[PT_ARRAYS];
-    pt_cloud_sections(cloud, sections);
-    for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
-        if (sections[i].size && !(*sections[i].data = pt_pages_reserve(sections[i].size)))
-            return PATINA_ERROR_MEMORY;
-    return PATINA_OK;
-}
-
 static int begin(struct patina_cloud *cloud, const patina_pages_desc *desc)
 {
     struct pt_paged *paged = cloud->paged = calloc(1, sizeof *paged);
@@ -203,15 +193,16 @@ static int begin(struct patina_cloud *cloud, const patina_pages_desc *desc)
     paged->totals = malloc(desc->page_count * sizeof *paged->totals);
     paged->beneath = malloc(desc->page_count * sizeof *paged->beneath);
     paged->over = malloc(desc->page_count * sizeof *paged->over);
-    paged->page_of = pt_pages_reserve(cloud->chunk_count * sizeof *paged->page_of);
-    cloud->chunks = pt_pages_reserve(cloud->chunk_count * sizeof *cloud->chunks);
+    paged->page_of = pt_paged_table(cloud->chunk_count * sizeof *paged->page_of);
+    cloud->chunks = pt_paged_table(cloud->chunk_count * sizeof *cloud->chunks);
     paged->table = cloud->chunks ? cloud->chunk_count * sizeof *cloud->chunks : 0;
     if (!paged->pages || !paged->marks || !paged->ways || !paged->there || !paged->staged || !paged->totals ||
         !paged->beneath || !paged->over || !paged->page_of || !cloud->chunks)
         return PATINA_ERROR_MEMORY;
     lay_out(cloud, desc);
     cloud->info.chunks = cloud->chunk_count;
-    return pt_paged_tree(paged) || take_arrays(cloud) ? PATINA_ERROR_MEMORY : pt_paged_parts(cloud);
+    return pt_paged_tree(paged) || pt_paged_arrays(cloud) || pt_paged_parts(cloud) ? PATINA_ERROR_MEMORY
+                                                                                   : pt_paged_firsts(cloud);
 }
 
 int patina_cloud_pages_begin(const patina_pages_desc *given, patina_cloud **out)

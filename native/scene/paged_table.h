@@ -79,6 +79,15 @@ int pt_paged_tree(struct pt_paged *paged);
 
 void pt_arrived_free(struct pt_page *page);
 
+// A table that pictures read here and there: of zeros, all of it there. NULL without memory.
+void *pt_paged_table(size_t size);
+// Room for the arrays; memory for what is first in each part, once these stand. 0 or PATINA_ERROR_MEMORY.
+int pt_paged_arrays(struct patina_cloud *cloud);
+int pt_paged_firsts(const struct patina_cloud *cloud);
+// Memory for a page's slots in the cloud's arrays, and for what kernels read behind them. 0 or PATINA_ERROR_MEMORY, with its message.
+int pt_page_need(struct patina_cloud *cloud, uint32_t index);
+void pt_page_forget(struct patina_cloud *cloud, const struct pt_page *page);
+
 // Slots of the i-th chunk of a page, and how many of them hold points: as patina_cloud_create cuts so many points evenly.
 uint32_t pt_page_share(const struct pt_page *page, uint32_t i);
 uint32_t pt_page_padded(const struct pt_page *page, uint32_t i);

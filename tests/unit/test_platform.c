@@ -48,8 +48,13 @@ static int choose_folder(void)
     wchar_t temporary[256];
     GetTempPathW(256, temporary);
     WideCharToMultiByte(CP_UTF8, 0, temporary, -1, folder, 300, NULL, NULL);
-    snprintf(folder + strlen(folder), 64, "patina-platform-%lu", (unsigned long)GetCurrentProcessId());
-    return make_folder(folder);
+    char *name = folder + strlen(folder);
+    int taken = 1;
+    for (int i = 0; i < 100 && taken; i++) { // a killed process may have left one, whose number comes again
+        snprintf(name, 64, "patina-platform-%lu-%d", (unsigned long)GetCurrentProcessId(), i);
+        taken = make_folder(folder);
+    }
+    return taken;
 }
 static int takes_signals(void) { return 0; }
 static const char mathematics[] = "ucrtbase.dll";
@@ -184,6 +189,36 @@ static void test_pages(void **state)
     }
     assert_null(pt_pages_alloc(SIZE_MAX));
     pt_pages_free(NULL, 0);
+}
+
+// Of more than memory has room for, what is needed is there; what is forgotten, but for its first and last page, can be needed again.
+static void test_reserve(void **state)
+{
+    (void)state;
+    const size_t size = (size_t)1 << 38, far = size / 3 + 5, some = 100000;
+    unsigned char *pages = pt_pages_reserve(size);
+    assert_non_null(pages);
+    for (int turn = 0; turn < 3; turn++) {
+        assert_int_equal(pt_pages_need(pages + far, some), 0);
+        assert_int_equal(pt_pages_need(pages + size - 1, 1), 0);
+        for (size_t i = 0; i < some && !turn; i++)
+            if (pages[far + i])
+                fail_msg("byte %zu is not 0", i);
+        memset(pages + far, 1, some);
+        pages[size - 1] = 2;
+        assert_int_equal(pt_pages_need(pages + far + some / 2, some), 0); // again, and more
+        pages[far + some + some / 2 - 1] = 3;
+        assert_int_equal(pages[far] + pages[far + some - 1], 2);
+        pt_pages_forget(pages + far + 7, some - 14);
+        assert_int_equal(pages[far + 6] + pages[far + some - 7] + pages[size - 1], 4);
+        assert_int_equal(pages[far + some + some / 2 - 1], 3);
+    }
+    assert_int_equal(pt_pages_need(pages, 0), 0);
+    pt_pages_free(pages, size);
+    assert_null(pt_pages_reserve(SIZE_MAX));
+    unsigned char *none = pt_pages_reserve(0);
+    assert_non_null(none);
+    pt_pages_free(none, 0);
 }
 
 static void test_disk(void **state)
@@ -451,10 +486,11 @@ static void test_library(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_threads), cmocka_unit_test(test_machine),         cmocka_unit_test(test_pages),
-        cmocka_unit_test(test_disk),    cmocka_unit_test(test_map_among_pages), cmocka_unit_test(test_large_stream),
-        cmocka_unit_test(test_whole),   cmocka_unit_test(test_decimal),         cmocka_unit_test(test_library),
-        cmocka_unit_test(test_mapped),  cmocka_unit_test(test_paths),           cmocka_unit_test(test_returned),
+        cmocka_unit_test(test_threads),      cmocka_unit_test(test_machine), cmocka_unit_test(test_pages),
+        cmocka_unit_test(test_reserve),      cmocka_unit_test(test_disk),    cmocka_unit_test(test_map_among_pages),
+        cmocka_unit_test(test_large_stream), cmocka_unit_test(test_whole),   cmocka_unit_test(test_decimal),
+        cmocka_unit_test(test_library),      cmocka_unit_test(test_mapped),  cmocka_unit_test(test_paths),
+        cmocka_unit_test(test_returned),
 #ifdef _WIN32
         cmocka_unit_test(test_held),
 #endif
@@ -462,7 +498,8 @@ int main(void)
     if (choose_folder())
         return 1;
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    for (const char *const *name = (const char *const[]){"pipe", "été 测试", "large", "kept", "returned", NULL}; *name; name++)
+    for (const char *const *name = (const char *const[]){"pipe", "été 测试", "small", "large", "kept", "returned", NULL}; *name;
+         name++)
         pt_file_remove(at(*name));
     remove_folder(folder);
     return failed;

@@ -47,7 +47,7 @@ typedef struct patina_pages_info {
     uint32_t returned; // how often a page was given back
 } patina_pages_info;
 
-// Makes the cloud, of however many points, of which a page has at most 2^31 - 1; memory is taken as they arrive (Windows: is promised for all).
+// Makes the cloud, of however many points, of which a page has at most 2^31 - 1; memory is taken as they arrive.
 // Points' numbers are those of their pages one behind the other, whichever arrives first.
 PATINA_API int patina_cloud_pages_begin(const patina_pages_desc *desc, patina_cloud **out);
 // Hands a page's points in. Any thread, at any time, several at once, while pictures of the cloud are drawn too: the next picture of it
