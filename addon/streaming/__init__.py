@@ -63,6 +63,7 @@ class Stream:
         self.notes: list[str] = []  # what the artist should know beside, with the address: nothing lacks for it
         self.arrived = 0  # pages so far
         self.has_scalar = False
+        self.lacking = 0  # points that pictures wanted at the last wish and that were not there
         self._lock = threading.RLock()  # a final picture's thread, and Blender's
         self._folder = tempfile.TemporaryDirectory(prefix="patina-pages-", ignore_cleanup_errors=True)
         self._place = Path(self._folder.name)
@@ -125,13 +126,21 @@ class Stream:
 
     # ---- its pages
 
-    def wish(self, least_px: float) -> None:
-        """Asks for what pictures wanted since the last call, in place of what was asked for before."""
+    @property
+    def point_bytes(self) -> int:
+        """That a point takes in memory."""
+        return 21 + {"uint8": 3, "uint16": 6}.get(self._color, 0) + 4 * self.has_scalar
+
+    def wish(self, least_px: float, count_all: bool = False) -> None:
+        """Asks for what pictures wanted since the last call, in place of what was asked for before: the first of it, where it is much.
+        count_all: lacking is of all."""
         with self._lock:
             if self._down:
                 return
             self._notice_returned()
-            found = self.cloud.wanted(least_px, ROOM)
+            found = self.cloud.wanted(least_px, len(self._counts) if count_all else ROOM)
+            self.lacking = int(self._counts[found].sum()) if found else 0
+            found = found[:ROOM]
             coming = {page for page, _ in self._tasks}
             wanted = {page: None for page in found if page not in self._bad and page not in coming}
             if list(wanted) != list(self._asked):

@@ -14,7 +14,7 @@ from check_formats import with_laspy
 from copc_files import claim, points_of, too_fine, write_copc
 from harness import SCRATCH, check, new_scene, render, reports, stats
 from mathutils import Matrix
-from patina import native, streaming
+from patina import memory, native, streaming
 from patina.sync import addresses, clouds, edits, linked
 from range_server import Server
 
@@ -94,6 +94,24 @@ def test_what_asks_for_the_whole():
     check(np.array_equal(plain["Combined"], edited["Combined"]), "the picture changed")
     for word in ("neither hidden nor graded", "to be soft by"):
         check(any(word in text for _, text in reports), f"{word}: {reports}")
+
+
+def test_more_than_memory_is_told_beforehand():
+    path, entries, _ = made("much.copc.laz")
+    clouds.CACHE.clear()
+    new_scene()
+    see(import_copc(path, 'ON'))
+    free = memory.free
+    memory.free = lambda: 400_000
+    try:
+        bpy.ops.render.render()
+    except RuntimeError:
+        pass
+    finally:
+        memory.free = free
+    check(any(f"shows {POINTS:,} points that are not there yet" in text for _, text in reports), f"{reports}")
+    check(stream_of().arrived == 0, "points were fetched")
+    check(np.isfinite(render()["Depth"]).any(), "nothing is drawn once there is room")
 
 
 def test_only_what_is_seen():
