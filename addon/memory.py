@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 SHARE = 0.5  # of what is free: Blender, the points and the finished picture want some too
@@ -37,6 +38,7 @@ def _group_left() -> int | None:
     try:
         place = Path("/sys/fs/cgroup") / Path("/proc/self/cgroup").read_text("ascii").rpartition("::/")[2].strip()
         most, used = ((place / name).read_text("ascii").strip() for name in ("memory.max", "memory.current"))
-        return None if most == "max" else max(int(most) - int(used), 0)
+        files = re.search(r"^inactive_file (\d+)$", (place / "memory.stat").read_text("ascii"), re.MULTILINE)  # kept of files, and given up at need
+        return None if most == "max" else max(int(most) - int(used) + (int(files[1]) if files else 0), 0)
     except (OSError, ValueError):
         return None

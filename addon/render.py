@@ -223,9 +223,8 @@ def await_points(description: SceneDescription, poll: Callable[[str, float], boo
                 with native.Scene() as scene:
                     describe(scene, piece.description, ["COMBINED"])
                     frame.plan(scene)
-            if not wants_points(description):
+            if not wants_points(description, memory.free()):
                 return
-            _check_room(streams)
             while any(stream.busy for stream in streams):
                 for stream in streams:
                     stream.advance()
@@ -237,25 +236,14 @@ def await_points(description: SceneDescription, poll: Callable[[str, float], boo
                 time.sleep(jobs.INTERVAL / 4)
 
 
-def wants_points(description: SceneDescription) -> bool:
-    """Whether pictures since the last call wanted points that are not there, and may come."""
+def wants_points(description: SceneDescription, room: int | None = None) -> bool:
+    """Whether pictures since the last call wanted points that are not there, and may come. PatinaError where these take more than room."""
     found = False
     for stream in streaming.streams_of(item.cloud for item in description.clouds):
-        stream.wish(0.0, count_all=True)
+        size = stream.wish(0.0, room)
+        room = None if room is None else room - size
         found |= stream.busy
     return found
-
-
-def _check_room(streams: Iterable[streaming.Stream]) -> None:
-    """PatinaError where what is still to come takes more memory than there is: Blender would be ended by the system."""
-    lacking = {stream: stream.lacking * stream.point_bytes for stream in streams}
-    left = memory.free()
-    if left is None or sum(lacking.values()) <= left:
-        return
-    most = max(lacking, key=lambda stream: lacking[stream])
-    raise native.PatinaError(f"{most.place}: the picture shows {most.lacking:,} points that are not there yet, {lacking[most] / 1e9:,.1f} GB "
-                             f"of memory, where {left / 1e9:,.1f} are free. Look at less of it, or choose Linked File > Read Whole, which "
-                             "draws from the disk", native.MEMORY)
 
 
 def bake_shadows(description: SceneDescription, path: str) -> None:

@@ -14,7 +14,7 @@ from bpy.types import Context, Object, Operator
 
 from .. import importers, jobs, native
 from ..native.points import pick
-from ..sync import clips, clouds, edits, files, linked, sequence, style_of
+from ..sync import addresses, clips, clouds, edits, files, linked, sequence, style_of
 from ..sync.analyzing import ANALYSES
 
 HOW = (('SET', "Set", "Only these", 0), ('ADD', "Extend", "These too", 1), ('SUB', "Subtract", "Not these", 2),
@@ -28,6 +28,8 @@ def editable(obj: Object | None) -> str:
     if obj.library or obj.mode != 'OBJECT':
         return "the object belongs to another file" if obj.library else "only in Object Mode"
     path = files.path_of(obj)
+    if isinstance(path, addresses.Address) or path and not sequence.is_pattern(path) and addresses.is_streamed(path, obj.patina.stream):
+        return "its points are read as needed: Linked File > Read Whole has all of them"
     return "points of a sequence are others in every frame" if path and sequence.is_pattern(path) else ""
 
 

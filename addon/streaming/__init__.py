@@ -63,13 +63,13 @@ class Stream:
         self.notes: list[str] = []  # what the artist should know beside, with the address: nothing lacks for it
         self.arrived = 0  # pages so far
         self.has_scalar = False
-        self.lacking = 0  # points that pictures wanted at the last wish and that were not there
         self._lock = threading.RLock()  # a final picture's thread, and Blender's
         self._folder = tempfile.TemporaryDirectory(prefix="patina-pages-", ignore_cleanup_errors=True)
         self._place = Path(self._folder.name)
         self._asked: dict[int, None] = {}  # pages in the order of their being wanted
         self._tasks: list[tuple[int, native.Task]] = []
         self._bad: set[int] = set()
+        self._offline = bool(offline)
         self._down = False  # nothing can be fetched: until somebody tries again
         self._returned = self._seen = 0
         self._here: set[int] = set()
@@ -126,26 +126,34 @@ class Stream:
 
     # ---- its pages
 
-    @property
-    def point_bytes(self) -> int:
-        """That a point takes in memory."""
-        return 21 + {"uint8": 3, "uint16": 6}.get(self._color, 0) + 4 * self.has_scalar
-
-    def wish(self, least_px: float, count_all: bool = False) -> None:
+    def wish(self, least_px: float, room: int | None = None) -> int:
         """Asks for what pictures wanted since the last call, in place of what was asked for before: the first of it, where it is much.
-        count_all: lacking is of all."""
+        Returns the bytes of memory that all of it takes; PatinaError, and nothing is asked for, where that is more than room."""
         with self._lock:
             if self._down:
-                return
+                return 0
             self._notice_returned()
-            found = self.cloud.wanted(least_px, len(self._counts) if count_all else ROOM)
-            self.lacking = int(self._counts[found].sum()) if found else 0
-            found = found[:ROOM]
+            found = self.cloud.wanted(least_px, ROOM)
+            size = self._size_of_wanted()
+            if room is not None and size > room:
+                self._asked = {}
+                self._say({"pages": []})
+                raise native.PatinaError(f"{self.place}: the picture shows points that are not there yet and take {size / 1e9:,.1f} GB of memory, "
+                                         f"where {room / 1e9:,.1f} are free. Look at less of it, or choose Linked File > Read Whole, which draws "
+                                         "from the disk", native.MEMORY)
             coming = {page for page, _ in self._tasks}
             wanted = {page: None for page in found if page not in self._bad and page not in coming}
             if list(wanted) != list(self._asked):
                 self._asked = wanted
                 self._say({"pages": list(wanted)})
+            return size
+
+    def _size_of_wanted(self) -> int:
+        """Bytes; 0 where nothing is fetched. What is there already may be given back for it."""
+        pages = self.cloud.pages()
+        lacking = pages["wanted"] - sum(int(self._counts[page]) for page in self._bad)
+        each = 21 + {"uint8": 3, "uint16": 12}.get(self._color, 0) + 4 * self.has_scalar
+        return 0 if self._offline else max(lacking - pages["arrived"], 0) * each
 
     def _notice_returned(self) -> None:
         """Pages that the library gave back may come again."""

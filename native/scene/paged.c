@@ -327,7 +327,7 @@ int pt_whole_enter(const struct patina_cloud *cloud, const char *call)
     int refused = pt_parts_refuse(cloud, call);
     if (refused || (refused = pt_paged_refuse(cloud, call)))
         return refused;
-    pt_paged_enter(cloud, 1);
+    pt_paged_enter(cloud, 0); // no picture: what pictures show is no older for it
     if (pt_paged_whole(cloud))
         return PATINA_OK;
     pt_paged_leave(cloud); // pages were given back in between
