@@ -558,11 +558,11 @@ def other(path):
     """Another Blender, which builds the cloud of a file in this one's folder."""
     text = OTHER.format(here=str(Path(__file__).resolve().parent), folder=str(SCRATCH), path=str(path))
     program = [bpy.app.binary_path, "-b", "--factory-startup", "--python-use-system-env", "--python-expr"] if bpy.app.binary_path else [sys.executable, "-c"]
-    return subprocess.Popen([*program, text], stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen([*program, text], stdout=subprocess.PIPE, bufsize=0)  # begins() takes no byte of what follows
 
 
 def begins(process):
-    check(any(line.strip() == "begins" for line in process.stdout), "it did not begin")
+    check(any(line.strip() == b"begins" for line in process.stdout), "it did not begin")
 
 
 def test_two_at_once():
@@ -580,7 +580,7 @@ def test_two_at_once():
         if kill:
             time.sleep(0.3)
             both[0].kill()
-        told = [process.communicate(timeout=300)[0] for process in both]
+        told = [process.communicate(timeout=300)[0].decode() for process in both]
         check("has it" in told[1] and (kill or "has it" in told[0]), f"{told}")
         check(source.kept.read_bytes() == wanted, "another cloud")
         with Small():

@@ -6,7 +6,7 @@ import shutil
 
 import bpy
 import numpy as np
-from check_copc import import_copc, in_a_hurry, made, open_address, same, see, server, stream_of
+from check_copc import free_memory, import_copc, in_a_hurry, made, open_address, same, see, server, stream_of
 from check_formats import with_laspy
 from copc_files import points_of, too_fine
 from ept_files import write_ept
@@ -68,7 +68,8 @@ def test_ept_of_billions_of_points():
     check(not reports, f"{reports}")
     finer = too_fine(1 + max(int(key.partition("-")[0]) for key in counts))
     (folder / "ept-hierarchy" / "0-0-0-0.json").write_text(json.dumps(counts | {"-".join(map(str, key)): count for key, count in finer}))
-    found = shown(folder / "ept.json")
+    with free_memory(None):  # finer nodes lie nowhere: a picture without them can be had
+        found = shown(folder / "ept.json")
     said = " ".join(text for _, text in reports)
     told = stream_of().cloud.pages()
     check(told["points"] == POINTS + sum(count for _, count in finer) > 22e9 and told["arrived"] == POINTS, f"{told}")
