@@ -14,7 +14,7 @@ from bpy.types import Context, Object, Operator
 
 from .. import importers, jobs, native
 from ..native.points import pick
-from ..sync import addresses, clips, clouds, edits, files, linked, sequence, style_of
+from ..sync import clips, clouds, edits, files, linked, sequence, style_of
 from ..sync.analyzing import ANALYSES
 
 HOW = (('SET', "Set", "Only these", 0), ('ADD', "Extend", "These too", 1), ('SUB', "Subtract", "Not these", 2),
@@ -28,17 +28,17 @@ def editable(obj: Object | None) -> str:
     if obj.library or obj.mode != 'OBJECT':
         return "the object belongs to another file" if obj.library else "only in Object Mode"
     path = files.path_of(obj)
-    if isinstance(path, addresses.Address) or path and not sequence.is_pattern(path) and addresses.is_streamed(path, obj.patina.stream):
-        return "its points are read as needed: Linked File > Read Whole has all of them"
     return "points of a sequence are others in every frame" if path and sequence.is_pattern(path) else ""
 
 
 def cloud_of(obj: Object, context: Context) -> native.Cloud:
-    """PatinaError where the file cannot be read."""
+    """PatinaError where the file cannot be read, or not all of it is."""
     notices: list[str] = []
     source = linked.source_of(obj, context.scene.frame_current, notices)
     if source is None:
         raise native.PatinaError(notices[0] if notices else "the file is missing")
+    if source.streamed:
+        raise native.PatinaError("its points are read as needed: Linked File > Read Whole has all of them")
     return jobs.finish(clouds.CACHE.obtain_linked(source, importers.Progress()))
 
 

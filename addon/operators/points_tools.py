@@ -67,7 +67,11 @@ both intersect"""
             if obj.name_full not in found:
                 continue  # not in this view
             bits = found[obj.name_full]
-            count = points.cloud_of(obj, context).count
+            try:
+                count = points.cloud_of(obj, context).count
+            except native.PatinaError as error:  # others can be
+                self.report({'WARNING'}, points.importers.told(f"Patina: '{obj.name}': {error}"))
+                continue
             try:
                 old = edits.for_cloud(edits.packed_of(obj), count) or edits.none(count)
             except edits.Damaged as damaged:

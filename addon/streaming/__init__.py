@@ -128,13 +128,13 @@ class Stream:
 
     def wish(self, least_px: float, room: int | None = None) -> int:
         """Asks for what pictures wanted since the last call, in place of what was asked for before: the first of it, where it is much.
-        Returns the bytes of memory that all of it takes; PatinaError, and nothing is asked for, where that is more than room."""
+        PatinaError, and nothing is asked for, where all of it takes more memory than room, in bytes; returns how much that is (0 without room)."""
         with self._lock:
             if self._down:
                 return 0
             self._notice_returned()
             found = self.cloud.wanted(least_px, ROOM)
-            size = self._size_of_wanted()
+            size = self._size_of_wanted() if room is not None else 0
             if room is not None and size > room:
                 self._asked = {}
                 self._say({"pages": []})

@@ -104,6 +104,12 @@ def test_what_asks_for_the_whole():
     objects[0].patina.soft.use, objects[0].patina.soft.by = True, 'LUMINANCE'
     edited = render()
     check(np.array_equal(plain["Combined"], edited["Combined"]), "the picture changed")
+    bpy.context.view_layer.objects.active = objects[0]
+    try:
+        bpy.ops.object.patina_points_select_all(action='SELECT')
+        check(False, "points were selected")
+    except RuntimeError as error:
+        check("read as needed" in str(error), f"{error}")
     for word in ("neither hidden nor graded", "to be soft by"):
         check(any(word in text for _, text in reports), f"{word}: {reports}")
 
