@@ -29,6 +29,7 @@ class Buffer:
     repeats: bool
     optional: bool
     block: bool = False
+    shares: str = ""  # its block has the binding of that buffer's
     binding: int = 0
     unit: int = -1
     soft: bool = False  # a texture only in software
@@ -95,8 +96,8 @@ def _buffer(words: list[str], listing: Listing) -> Buffer:
                 raise ValueError(f"{one} is none of {', '.join(known)}")
     for word in words[4:]:
         unit = word[5:] if word.startswith("soft:") else word
-        if word == "block":
-            buffer.block = True
+        if word.partition("@")[0] == "block":
+            buffer.block, buffer.shares = True, word.partition("@")[2]
         elif word == "uniform" and access == "r":
             buffer.in_uniform = True
         elif word == "-" and len(words) == 5:
@@ -129,7 +130,9 @@ def _number(kernel: Kernel) -> None:
         kernel.scratch[TILE_LIST] = 0
     binding = 1
     for buffer in kernel.buffers:
-        if buffer.block:
+        if buffer.shares:
+            buffer.binding = next(b.binding for b in kernel.buffers if b.name == buffer.shares)
+        elif buffer.block:
             buffer.binding, binding = binding, binding + 1
         elif buffer.in_uniform:
             buffer.uniform = max(kernel.uniforms.values()) + 1
@@ -189,7 +192,8 @@ def parse(text: str) -> Listing:
         if kernel.domain == "bins" and not any(b.formats == ["bins"] for b in kernel.buffers):
             raise ValueError(f"{kernel.name} reduces tiles, and has no buffer of bins")
         chunks = [i for i, b in enumerate(kernel.buffers) if b.formats == ["chunk"]]
-        if chunks and "position" not in kernel.buffers[chunks[0] + 1].formats:
+        read = any("position" in b.formats for b in kernel.buffers)
+        if chunks and read and "position" not in kernel.buffers[chunks[0] + 1].formats:
             raise ValueError(f"{kernel.name}: positions follow chunks")
     return listing
 

@@ -111,7 +111,8 @@ enum {
     PT_COPY = 0,
     PT_BORROW = 1, // that lives as long as the buffer, unchanged: a device need not copy it
     PT_IN_RANGES =
-        2, // what a cloud's points have: a device that copies does so a range at a time, whenever a kernel asks for it
+        2,         // what a cloud's points have: a device that copies does so a range at a time, whenever a kernel asks for it
+    PT_ZEROED = 4, // without a source: it is zero; on the processor pages that nobody touches take no memory
 };
 
 // What a device that copies clouds may hold of them, where they are larger.
@@ -124,7 +125,7 @@ struct pt_ranges {
 
 struct pt_device_ops {
     void (*destroy)(struct patina_device *device);
-    // Uninitialised memory, or a copy of source when not NULL. how: bits PT_BORROW, PT_IN_RANGES.
+    // Uninitialised memory, or a copy of source when not NULL. how: bits PT_BORROW, PT_IN_RANGES, PT_ZEROED.
     int (*buffer_create)(struct patina_device *device, size_t size, const void *source, int how, struct pt_buffer *out);
     void (*buffer_destroy)(struct patina_device *device, struct pt_buffer *buffer);
     int (*buffer_write)(struct patina_device *device, struct pt_buffer *buffer, size_t offset, const void *source, size_t size);

@@ -36,7 +36,7 @@ static int cpu_buffer_create(struct patina_device *device, size_t size, const vo
         out->data = (void *)source;
         return PATINA_OK;
     }
-    out->data = pt_pages_alloc(size + PT_SLACK);
+    out->data = pt_pages_alloc(size + PT_SLACK); // zeroed
     if (!out->data) {
         *out = (struct pt_buffer){0};
         return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "%s: out of memory for a buffer of %zu bytes", device->info.name,

@@ -415,7 +415,9 @@ static int op_buffer_create(struct patina_device *device, size_t size, const voi
     memset(out, 0, sizeof *out);
     if (how & PT_IN_RANGES && size && source)
         return keep_in_ranges(device, size, source, how, out);
-    const int result = call(device, create_buffer, &(struct buffer_call){.buffer = out, .size = size, .source = source});
+    int result = call(device, create_buffer, &(struct buffer_call){.buffer = out, .size = size, .source = source});
+    if (result == PATINA_OK && how & PT_ZEROED)
+        result = call(device, fill_buffer, &(struct buffer_call){.buffer = out, .size = size, .bytes = 4});
     out->source = result == PATINA_OK && how & PT_BORROW ? source : NULL;
     return result;
 }

@@ -112,7 +112,7 @@ static pt_gl_runner *const runners[PT_KERNEL_COUNT] = {
     [PT_KERNEL_extract] = run_extract, [PT_KERNEL_ink] = run_ink,
     [PT_KERNEL_gather] = pt_gl_gather, [PT_KERNEL_soft] = pt_gl_soft,
     [PT_KERNEL_merge] = pt_gl_merge,   [PT_KERNEL_differ] = pt_gl_differ,
-    [PT_KERNEL_dim] = pt_gl_points,
+    [PT_KERNEL_dim] = pt_gl_points,    [PT_KERNEL_rank] = pt_gl_points,
 };
 
 static int run_once(struct pt_gl_device *d, const struct pt_gl_work *work)

@@ -50,7 +50,11 @@ static size_t position_bytes(const struct instance_buffers *b)
     return packed ? packed : 4 * PT_POSITION_WORDS;
 }
 
-static uint64_t slots_of(const struct instance_buffers *b) { return b->buffers[POSITIONS]->size / position_bytes(b); }
+// 0: the kernel reads no positions, and nothing that is bound in parts.
+static uint64_t slots_of(const struct instance_buffers *b)
+{
+    return b->rows[POSITIONS].formats & 1u << PT_FORMAT_position ? b->buffers[POSITIONS]->size / position_bytes(b) : 0;
+}
 
 // Bytes a slot; 0: it is not bound in parts.
 static size_t bytes_of(const struct instance_buffers *b, uint32_t k)
@@ -161,7 +165,8 @@ static int run_pass(struct pt_gl_device *d, const struct instance_buffers *b, co
         if (b->parts && (result = begin_large(d, b)) != PATINA_OK)
             break;
         d->gl.ProgramUniform1ui(d->programs[b->work->kernel][pass], 0, part->first_chunk + done);
-        d->gl.ProgramUniform1ui(d->programs[b->work->kernel][pass], 1, (GLuint)part->first);
+        if (slots_of(b))
+            d->gl.ProgramUniform1ui(d->programs[b->work->kernel][pass], 1, (GLuint)part->first);
         // llvmpipe: 1M points in 21 ms with one, 27 ms with 4: setting a chunk up costs more than idle lanes.
         result = pt_gl_dispatch(d, b->work->kernel, pass, groups, d->base.info.hardware ? SLICES : 1);
         if (b->parts && result == PATINA_OK)
@@ -357,8 +362,9 @@ static int blend_band(struct pt_gl_device *d, const struct pt_gl_work *work, uin
     }
     for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
         result = run_discs(d, work, PT_BUF_blend_chunks, part + ADD, 1, i, width, end - first);
-    if (result == PATINA_OK) // large discs were bound there
-        result = pt_gl_bind_rows(d, work, PT_BUF_blend_offset, 1, work->buffers + PT_BUF_blend_offset);
+    static const uint32_t shared[] = {PT_BUF_blend_offset, PT_BUF_blend_normal}; // with large discs, and marks
+    for (uint32_t i = 0; i < 2 && result == PATINA_OK; i++)
+        result = pt_gl_bind_rows(d, work, shared[i], 1, work->buffers + shared[i]);
     if (result != PATINA_OK)
         return result;
     return pt_gl_dispatch(d, PT_KERNEL_blend, part + MEAN, (width + 31) / 32, (end - first + 7) / 8);

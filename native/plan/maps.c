@@ -110,6 +110,7 @@ static void add_dim(struct tests *tests, uint32_t instance, const struct shadow_
                             .alone = asked->alone,
                             .close = asked->close,
                             .samples = asked->samples,
+                            .step = asked->step,
                             .compare = asked->compare,
                             .marked = asked->marked,
                             .veils = map->soft.veils,
@@ -138,9 +139,10 @@ static int add_test(struct tests *tests, uint32_t instance, const struct pt_inst
     if (error)
         return error;
     out->cloud = instance == PT_PIXELS ? NULL : receiver->cloud;
-    args.base = tests->round->light * (uint32_t)receiver->cloud->slots;
     if (instance == PT_PIXELS)
         args.marked = args.compare = 0;
+    args.base = tests->round->light * (args.marked ? 1 : (uint32_t)receiver->cloud->slots);
+    args.step = args.marked ? tests->picture->light_count : 1;
     if (args.marked)
         out->chunk_count = keep_seen(tests->picture, instance, out->chunks, out->chunk_count);
     if (!out->chunk_count)

@@ -163,8 +163,8 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
         builder, shade, args,
         {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0), pt_span_of(plan),
          pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder), pt_plane_at(color, 0), pt_nothing(),
-         unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS), pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0),
-         pt_light_of(builder, &args), pt_ramps_of(&args)});
+         unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS), pt_nothing(),
+         pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0), pt_light_of(builder, &args), pt_ramps_of(&args)});
     pass->late = pt_shade_late(&args, PT_LATE_PIXELS);
     PT_REASON(pass, "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);
 }

@@ -52,6 +52,11 @@ static inline struct pt_ref pt_buffer_of(enum pt_instance_buffer which, uint32_t
 {
     return (struct pt_ref){PT_OF_INSTANCE, which, instance};
 }
+// Of an instance of the scene, for who reads shadow words: where those of marked points lie.
+static inline struct pt_ref pt_marks_of(const struct pt_builder *builder, uint32_t instance)
+{
+    return pt_plan_lazy(builder->scene, builder->plan) ? pt_buffer_of(PT_MARKS, instance) : pt_nothing();
+}
 // Where nothing is known but spacings, d_eff is the span.
 static inline struct pt_ref pt_span_of(const struct pt_plan *plan)
 {

@@ -55,6 +55,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
                                    pt_span_of(plan), of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i),
                                    pt_shading_of(builder), pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i),
                                    args.of_pixels ? pt_plane_at(PT_PLANE_LIGHT, 0) : pt_buffer_of(PT_SHADOWS, instance->of),
+                                   args.of_pixels ? pt_nothing() : pt_marks_of(builder, instance->of),
                                    pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0), pt_light_of(builder, &args),
                                    pt_ramps_of(&args)});
     pass->late = pt_shade_late(&args, PT_LATE_POINTS);
@@ -244,6 +245,20 @@ static const char *no_shadows(const struct patina_scene *scene)
                         : NULL;
 }
 
+static void plan_ranks(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        const struct pt_plan_instance *instance = &plan->instances[i];
+        const struct rank_args args = {.view = plan->view};
+        if (instance->chunk_count && pt_receives(instance->instance))
+            PT_REASON(
+                PT_ADD(builder, rank, args,
+                       {pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_MARKS, instance->of), {PT_OF_FLAG, PT_FLAG_MARKED, 0}}),
+                "shadow words of instance %u are those of marked points", i);
+    }
+}
+
 static void plan_marks(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
@@ -280,6 +295,10 @@ static void plan_marks(struct pt_builder *builder)
     }
     if (!marked)
         pt_skip(builder, "mark", "the discs that pixels show are marked");
+    if (none || !lazy)
+        pt_skip(builder, "rank", none ? none : "shadow words of all points");
+    else
+        plan_ranks(builder);
 }
 
 static int is_of_points(enum pt_stage stage)

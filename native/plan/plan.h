@@ -528,8 +528,13 @@ int pt_plan_close(const struct patina_scene *scene, const struct pt_plan *pictur
 // Whether anything is tested against the group's maps.
 int pt_plan_tested(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
                    uint32_t group);
-// shading.c: writes what is known late into a copy of the pass's arguments; samples: of each light, in the words.
-void pt_plan_late(const struct pt_pass *pass, const uint32_t samples[PT_MAX_LIGHTS], void *arguments);
+// Shadow words as a pass finds them.
+struct pt_words {
+    uint32_t samples[PT_MAX_LIGHTS]; // of each light
+    uint32_t step;                   // of marked points alone, so many a point; 0: of all slots, a light's behind the other's
+};
+// shading.c: writes what is known late into a copy of the pass's arguments.
+void pt_plan_late(const struct pt_pass *pass, const struct pt_words *words, void *arguments);
 // plan.c: the loops of all shadow textures, without a picture.
 int pt_plan_textures(const struct patina_scene *scene, struct pt_plan *plan);
 

@@ -101,6 +101,10 @@ uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, s
                 list->arrays |= array_bit((enum pt_instance_buffer)pass->refs[i].which, cloud);
                 list->copied += copied_of(pass->refs[i].which, cloud);
             }
+        if (!list->arrays && !list->copied) { // nothing of its points is read
+            count--;
+            continue;
+        }
         list->each[0] = bytes_of(list, list->arrays & ~list->culled);
         list->each[1] = bytes_of(list, list->arrays);
     }

@@ -126,24 +126,28 @@ struct pt_ref pt_light_of(struct pt_builder *builder, const struct shade_args *a
 // Of a sum of so many samples, what one of it is of all light.
 static float scale_of(uint32_t samples) { return 1.0f / (255.0f * (float)samples); }
 
-static void set_blend(const uint32_t samples[PT_MAX_LIGHTS], struct blend_args *args)
+static void set_blend(const struct pt_words *words, struct blend_args *args)
 {
+    args->marked = words->step > 0;
+    args->step = words->step;
     for (uint32_t i = 0; i < args->lights; i++)
-        args->scales[i] = scale_of(samples[args->first + i]);
+        args->scales[i] = scale_of(words->samples[args->first + i]);
 }
 
-static void set_shade(const uint32_t samples[PT_MAX_LIGHTS], struct shade_args *args)
+static void set_shade(const struct pt_words *words, struct shade_args *args)
 {
+    args->marked = !args->of_pixels && words->step > 0;
+    args->step = words->step;
     for (uint32_t i = 0; i < args->casting; i++)
-        args->scales[i] = args->of_pixels ? 1.0f / (float)PT_SHADOW_SUM : scale_of(samples[i]);
+        args->scales[i] = args->of_pixels ? 1.0f / (float)PT_SHADOW_SUM : scale_of(words->samples[i]);
 }
 
-void pt_plan_late(const struct pt_pass *pass, const uint32_t samples[PT_MAX_LIGHTS], void *arguments)
+void pt_plan_late(const struct pt_pass *pass, const struct pt_words *words, void *arguments)
 {
     if (pass->late == PT_LATE_NOTHING)
         return;
     if (pass->kernel == PT_KERNEL_blend)
-        set_blend(samples, arguments);
+        set_blend(words, arguments);
     else
-        set_shade(samples, arguments);
+        set_shade(words, arguments);
 }

@@ -32,8 +32,9 @@ int pt_blends_light(const struct pt_builder *builder)
 }
 
 // Binds what both kernels read of an instance; `blend`, if there is one, reads colours too, or marks or shadows.
-static uint32_t bind_instance(struct pt_ref *refs, const struct pt_plan *plan, uint32_t i, const struct blend_args *blend)
+static uint32_t bind_instance(struct pt_ref *refs, const struct pt_builder *builder, uint32_t i, const struct blend_args *blend)
 {
+    const struct pt_plan *plan = builder->plan;
     uint32_t count = pt_bind_kind(PT_AS_DISCS, i, refs);
     if (!blend)
         return count;
@@ -41,6 +42,7 @@ static uint32_t bind_instance(struct pt_ref *refs, const struct pt_plan *plan, u
                     : blend->part == PT_BLEND_MARKS ? pt_buffer_of(PT_MARKS, plan->instances[i].of)
                                                     : pt_buffer_of(PT_SHADOWS, plan->instances[i].of);
     refs[count++] = pt_buffer_of(PT_OPACITIES, i);
+    refs[count++] = blend->part == PT_BLEND_LIGHT ? pt_marks_of(builder, plan->instances[i].of) : pt_nothing();
     return count;
 }
 
@@ -59,7 +61,7 @@ static int list_discs(struct pt_builder *builder, const struct blend_args *blend
 {
     struct pt_plan *plan = builder->plan;
     *out = (struct disc_pass){
-        .refs = pt_arena_take(&plan->arena, (plane_count + 1 + 6 * (size_t)plan->instance_count) * sizeof *out->refs),
+        .refs = pt_arena_take(&plan->arena, (plane_count + 1 + 7 * (size_t)plan->instance_count) * sizeof *out->refs),
         .args = pt_arena_take(&plan->arena, head + plan->instance_count * sizeof(struct disc_args)),
         .ref_count = plane_count};
     if (!out->refs || !out->args) {
@@ -85,7 +87,7 @@ static int list_discs(struct pt_builder *builder, const struct blend_args *blend
                                                      .shadowed = (uint32_t)pt_receives(instance->instance)};
         out->chunks += instance->chunk_count;
         out->points += instance->points;
-        out->ref_count += bind_instance(out->refs + out->ref_count, plan, i, blend);
+        out->ref_count += bind_instance(out->refs + out->ref_count, builder, i, blend);
     }
     out->arg_size = head + out->instances * sizeof *discs;
     return 1;

@@ -20,7 +20,7 @@ enum pt_ref_of {
     PT_OF_NOTHING, // the kernel does not look at it
 };
 
-enum pt_flag { PT_FLAG_DIFFERS, PT_FLAG_SOME, PT_FLAGS }; // see shadow_test, limit
+enum pt_flag { PT_FLAG_DIFFERS, PT_FLAG_SOME, PT_FLAG_MARKED, PT_FLAGS }; // see shadow_test, limit, rank
 
 struct pt_ref {
     enum pt_ref_of of;

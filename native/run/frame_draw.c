@@ -52,7 +52,8 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     shown->stats.mapped_rounds = frame->pager.rounds;
     shown->stats.mapped_returned = atomic_load(&frame->pager.returned);
     for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
-        shown->stats.shadow_bytes += frame->shadows.words[i].size;
+        shown->stats.shadow_bytes += frame->shadows.words[i].size + frame->shadows.marks[i].size;
+    shown->stats.shadow_bytes += frame->shadows.shown.size;
     frame->light_count = plan->light_count;
     for (uint32_t i = 0; i < plan->light_count; i++) {
         const struct pt_shadow_light *light = &frame->shadows.lights[i];

@@ -124,26 +124,57 @@ int pt_frame_read_ids(const struct patina_frame *frame, const struct patina_scen
     return read_plane(frame, "patina_frame_read_keys", keys, size);
 }
 
+// A buffer's bytes, of which the caller has to dispose; NULL: it cannot be read.
+static void *read_buffer(const struct patina_frame *frame, const struct pt_buffer *buffer, size_t at, size_t size)
+{
+    void *bytes = malloc(size + 1);
+    if (!bytes)
+        pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read_shadows: out of memory");
+    if (bytes && frame->device->ops->buffer_read(frame->device, buffer, at, bytes, size)) {
+        free(bytes);
+        return NULL;
+    }
+    return bytes;
+}
+
+// Shadow words of an instance; NULL each: there are none, or they cannot be read.
+struct words {
+    uint32_t *each, *marks; // marks: those of shown points
+    uint32_t first, step;   // of the light
+};
+
+static uint32_t word_of(const struct words *words, uint32_t slot)
+{
+    if (!words->marks)
+        return words->each[slot];
+    const uint32_t *pair = words->marks + 2 * (size_t)(slot / PT_MARK_SLOTS), own = 1u << slot % PT_MARK_SLOTS;
+    const uint32_t before = (uint32_t)__builtin_popcount(pair[0] & (own - 1));
+    return pair[0] & own ? words->each[(size_t)words->step * (pair[1] + before) + words->first] : 0;
+}
+
 // What arrives at the points of an instance, which of a cloud in parts is one of them.
 static int read_part(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values)
 {
     const struct pt_shadows *shadows = &frame->shadows;
     const struct patina_cloud *cloud = frame->numbering.clouds[instance].cloud;
-    const size_t bytes = shadows->words[instance].size / shadows->light_count;
-    if (!bytes)
+    const size_t bytes = shadows->words[instance].size / shadows->light_count, marks = shadows->marks[instance].size;
+    struct words words = {.first = light, .step = shadows->light_count};
+    if (!bytes && !marks)
         return PATINA_OK; // nothing of it was there
-    uint32_t *words = malloc(bytes + 1);
-    if (!words)
-        return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read_shadows: out of memory");
-    const int error = frame->device->ops->buffer_read(frame->device, &shadows->words[instance], light * bytes, words, bytes);
+    if (marks)
+        words.marks = read_buffer(frame, &shadows->marks[instance], 0, marks);
+    words.each = marks ? read_buffer(frame, &shadows->shown, 0, shadows->shown.size)
+                       : read_buffer(frame, &shadows->words[instance], light * bytes, bytes);
+    const int error = !words.each || (marks && !words.marks);
     const float scale = 1.0f / (255.0f * (float)shadows->lights[light].samples);
     for (uint32_t c = 0; c < cloud->chunk_count && !error; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t slot = chunk->first; slot < chunk->first + chunk->count; slot++)
-            values[pt_number_of(cloud, slot)] = 1.0f - (float)(words[slot] & PT_SHADOW_SUM) * scale;
+            values[pt_number_of(cloud, slot)] = 1.0f - (float)(word_of(&words, slot) & PT_SHADOW_SUM) * scale;
     }
-    free(words);
-    return error;
+    free(words.each);
+    free(words.marks);
+    return error ? pt_fail_again(&frame->handle, PATINA_ERROR_MEMORY) : PATINA_OK;
 }
 
 int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t number, uint32_t light, float *values, size_t size)
@@ -153,7 +184,7 @@ int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t number, uin
     const uint32_t parts = pt_numbering_parts(&frame->numbering, number, &first);
     uint64_t words = 0;
     for (uint32_t i = first; i < first + parts && i < shadows->instance_count; i++)
-        words += shadows->words[i].size;
+        words += shadows->words[i].size + shadows->marks[i].size;
     if (!words || first + parts > shadows->instance_count || light >= shadows->light_count || !shadows->lights[light].samples)
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: no texture of light %u on instance %u",
                        light, number);

@@ -274,7 +274,7 @@ static int take_textures(struct reader *reader, struct patina_frame *frame, cons
     if (!error)
         error = check_instances(*reader, scene);
     if (!error)
-        error = pt_shadows_make_places(frame->device, &frame->shadows, scene, plan->light_count);
+        error = pt_shadows_make_places(frame->device, &frame->shadows, scene, plan->light_count, 0);
     if (error)
         pt_fail_again(&frame->handle, error);
     for (uint32_t i = 0; i < reader->instances && !error; i++) {

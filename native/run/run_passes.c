@@ -12,16 +12,17 @@ static int arguments_of(struct pt_execution *e, uint32_t i, const void **out)
 {
     const struct pt_pass *pass = &e->plan->passes[i];
     const struct pt_shadows *shadows = e->binder.shadows;
-    uint32_t samples[PT_MAX_LIGHTS];
+    const int of_pixels = pass->late == PT_LATE_PIXELS;
+    struct pt_words words = {.step = shadows->of_marked && !of_pixels ? shadows->light_count : 0};
     *out = pass->arguments;
     if (pass->late == PT_LATE_NOTHING)
         return PATINA_OK;
     if (!e->late[i] && !(e->late[i] = malloc(pass->argument_size)))
         return pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t k = 0; k < PT_MAX_LIGHTS; k++)
-        samples[k] = pass->late == PT_LATE_PIXELS ? shadows->pixels.samples[k] : shadows->lights[k].samples;
+        words.samples[k] = of_pixels ? shadows->pixels.samples[k] : shadows->lights[k].samples;
     memcpy(e->late[i], pass->arguments, pass->argument_size);
-    pt_plan_late(pass, samples, e->late[i]);
+    pt_plan_late(pass, &words, e->late[i]);
     *out = e->late[i];
     return PATINA_OK;
 }

@@ -22,6 +22,7 @@ static void forget_instances(struct patina_device *device, struct pt_shadows *sh
     free(shadows->words);
     free(shadows->marks);
     free(shadows->fingerprints);
+    device->ops->buffer_destroy(device, &shadows->shown);
     shadows->words = shadows->marks = NULL;
     shadows->fingerprints = NULL;
     shadows->instance_count = 0;
@@ -44,6 +45,8 @@ struct pt_buffer *pt_shadows_buffer(struct pt_shadows *shadows, uint32_t which, 
         return &shadows->pixels.words;
     if (instance >= shadows->instance_count)
         return &shadows->none;
+    if (which == PT_SHADOWS && shadows->of_marked)
+        return &shadows->shown;
     return which == PT_MARKS ? &shadows->marks[instance] : &shadows->words[instance];
 }
 
@@ -62,10 +65,11 @@ static int same_places(const struct pt_shadows *shadows, const struct patina_sce
 }
 
 int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene,
-                           uint32_t light_count)
+                           uint32_t light_count, int of_marked)
 {
     forget_lights(shadows);
     forget_instances(device, shadows);
+    shadows->of_marked = (uint32_t)of_marked;
     shadows->words = calloc((size_t)scene->cloud_count + 1, sizeof *shadows->words);
     shadows->marks = calloc((size_t)scene->cloud_count + 1, sizeof *shadows->marks);
     shadows->fingerprints = calloc((size_t)scene->cloud_count + 1, sizeof *shadows->fingerprints);
@@ -78,7 +82,7 @@ int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shad
     for (uint32_t i = 0; i < scene->cloud_count; i++) {
         uint64_t points = scene->instances[i].cloud->slots;
         shadows->fingerprints[i] = pt_shadows_identity(&scene->instances[i]);
-        if (!shadows->fingerprints[i])
+        if (!shadows->fingerprints[i] || of_marked)
             continue;
         int error = light_count * points > UINT32_MAX
                         ? pt_fail(&device->handle, PATINA_ERROR_TOO_MANY_POINTS,
@@ -115,22 +119,24 @@ int pt_shadows_stale(const struct pt_shadows *shadows, const struct patina_scene
     return 0;
 }
 
-int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene,
-                    const struct pt_plan *plan)
+// No point is marked yet. Memory anew: on the processor what no picture marks takes none.
+static int make_marks(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene)
 {
-    int error = PATINA_OK, changed = 0;
-    if (!plan->light_count)
-        return PATINA_OK;
-    for (int i = 0; i < PT_FLAGS && !error; i++)
-        if (!shadows->flags[i].size)
-            error = device->ops->buffer_create(device, sizeof(uint32_t), NULL, 0, &shadows->flags[i]);
-    if (error)
-        return error;
-    if (!same_places(shadows, scene, plan)) {
-        error = pt_shadows_make_places(device, shadows, scene, plan->light_count);
-        changed = 1;
+    int error = pt_flag_write(device, shadows, PT_FLAG_MARKED, 0);
+    for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
+        const uint64_t groups = (scene->instances[i].cloud->slots + PT_MARK_SLOTS - 1) / PT_MARK_SLOTS;
+        device->ops->buffer_destroy(device, &shadows->marks[i]);
+        if (shadows->fingerprints[i])
+            error = device->ops->buffer_create(device, groups * 8, NULL, PT_ZEROED, &shadows->marks[i]);
     }
-    for (uint32_t i = 0; i < plan->light_count && !error; i++) {
+    return error;
+}
+
+// Compares the lights with those that words are of; those of others have no samples. *changed: there are such.
+static int match_lights(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene,
+                        const struct pt_plan *plan, int *changed)
+{
+    for (uint32_t i = 0; i < plan->light_count; i++) {
         struct pt_shadow_light *light = &shadows->lights[i];
         size_t count = pt_light_key(scene, &plan->lights[i], NULL, 0);
         double *key = malloc(count * sizeof *key);
@@ -138,32 +144,67 @@ int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, co
             return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
         pt_light_key(scene, &plan->lights[i], key, count);
         int known = light->key && light->key_count == count && pt_same_key(light->key, key, count);
-        changed |= !known;
+        *changed |= !known;
         if (!known || light->partial || (light->samples > plan->lights[i].samples && !light->settled))
             light->samples = light->settled = 0;
         free(light->key);
         light->key = key;
         light->key_count = count;
     }
-    if (!error)
-        error = pt_pixels_open(device, &shadows->pixels, scene, plan, changed);
-    if (error || !pt_plan_lazy(scene, plan) || !pt_shadows_stale(shadows, scene, plan))
-        return error;
-    for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
-        if (shadows->fingerprints[i] && !shadows->marks[i].size)
-            error = device->ops->buffer_create(device, (scene->instances[i].cloud->slots + 3) / 4 * 4, NULL, 0,
-                                               &shadows->marks[i]);
-        if (!error && shadows->marks[i].size)
-            error = device->ops->buffer_fill(device, &shadows->marks[i], 0, shadows->marks[i].size, 0, 4);
+    return PATINA_OK;
+}
+
+int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene,
+                    const struct pt_plan *plan)
+{
+    const int lazy = pt_plan_lazy(scene, plan);
+    int error = PATINA_OK, changed = 0;
+    if (!plan->light_count)
+        return PATINA_OK;
+    for (int i = 0; i < PT_FLAGS && !error; i++)
+        if (!shadows->flags[i].size)
+            error = device->ops->buffer_create(device, sizeof(uint32_t), NULL, 0, &shadows->flags[i]);
+    if (!error && (!same_places(shadows, scene, plan) || (shadows->of_marked && !lazy))) {
+        error = pt_shadows_make_places(device, shadows, scene, plan->light_count, lazy);
+        changed = 1;
     }
-    return error;
+    error = error ? error : match_lights(device, shadows, scene, plan, &changed);
+    if (!error && lazy && !shadows->of_marked &&
+        pt_shadows_stale(shadows, scene, plan)) { // what was whole is not whole any more
+        error = pt_shadows_make_places(device, shadows, scene, plan->light_count, 1);
+        error = error ? error : match_lights(device, shadows, scene, plan, &changed);
+    }
+    shadows->placed = 0;
+    if (!error && shadows->of_marked)
+        error = make_marks(device, shadows, scene);
+    return error ? error : pt_pixels_open(device, &shadows->pixels, scene, plan, changed);
 }
 
 // ---- words and flags -----------------------------------------------------------------------------------------------------
 
+// Room for the words of as many points as have ranks, without samples.
+static int place_marked(struct patina_device *device, struct pt_shadows *shadows)
+{
+    uint32_t marked = 0;
+    int error = pt_flag_read(device, shadows, PT_FLAG_MARKED, &marked);
+    const uint64_t count = (1 + (uint64_t)marked) * shadows->light_count;
+    if (!error && count > UINT32_MAX)
+        return pt_fail(&device->handle, PATINA_ERROR_TOO_MANY_POINTS,
+                       "shadows of %u lights on %u points: their product must stay below 4294967296", shadows->light_count,
+                       marked);
+    if (!error && shadows->shown.size < count * 4) {
+        device->ops->buffer_destroy(device, &shadows->shown);
+        error = device->ops->buffer_create(device, count * 4, NULL, 0, &shadows->shown);
+    }
+    shadows->placed = !error;
+    return error ? error : device->ops->buffer_fill(device, &shadows->shown, 0, count * 4, 0, 4);
+}
+
 int pt_shadows_clear(struct patina_device *device, struct pt_shadows *shadows, uint32_t light)
 {
     int error = PATINA_OK;
+    if (shadows->of_marked)
+        return shadows->placed ? PATINA_OK : place_marked(device, shadows);
     for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
         struct pt_buffer *words = &shadows->words[i];
         const size_t size = words->size / shadows->light_count;

@@ -27,6 +27,9 @@ struct pt_shadow_pixels {
 struct pt_shadows {
     struct pt_planes planes;         // of the maps
     struct pt_buffer *words, *marks; // per instance of the scene; empty where it receives none
+    struct pt_buffer shown;          // words of marked points, of all instances, in place of theirs
+    uint32_t of_marked;              // 1: those are meant
+    uint32_t placed;                 // they have room, and no samples yet
     uint64_t *fingerprints;          // per instance: of whose points the words are; 0: none
     uint32_t instance_count;
     struct pt_shadow_light lights[PT_MAX_LIGHTS]; // in the plan's order
@@ -40,22 +43,23 @@ struct pt_shadows {
 // Messages are at the device, of all that fails here.
 
 // Compares what the plan asks for with what is at hand and makes room. Afterwards pt_shadows_stale says whether any light
-// is to be tested in this render. With shadow_lazy the marks are cleared.
+// is to be tested in this render: with shadow_lazy marked points alone.
 int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene,
                     const struct pt_plan *plan);
 int pt_shadows_stale(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan);
 // Samples that the light has after this render.
 uint32_t pt_samples_wanted(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan,
                            uint32_t light);
-// A light's words at zero: no sample yet. Other lights' lie in the same buffers.
+// A light's words at zero: no sample yet. Other lights' lie in the same buffers. Of marked points, which have their ranks by now: all of
+// them, with the first light.
 int pt_shadows_clear(struct patina_device *device, struct pt_shadows *shadows, uint32_t light);
 int pt_flag_write(struct patina_device *device, struct pt_shadows *shadows, enum pt_flag flag, uint32_t word);
 int pt_flag_read(struct patina_device *device, const struct pt_shadows *shadows, enum pt_flag flag, uint32_t *word);
 // Of whose points words are; 0: the instance receives no shadows.
 uint64_t pt_shadows_identity(const struct pt_instance *instance);
-// Room for the words of these instances and lights, all forgotten.
+// Room for the words of these instances and lights, all forgotten; of_marked: for marks, in place of those.
 int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene,
-                           uint32_t light_count);
+                           uint32_t light_count, int of_marked);
 // An instance's marks or words; an empty buffer where there are none.
 struct pt_buffer *pt_shadows_buffer(struct pt_shadows *shadows, uint32_t which, uint32_t instance);
 void pt_shadows_release(struct patina_device *device, struct pt_shadows *shadows);

@@ -23,12 +23,15 @@ layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
 #if PART == PT_BLEND_COLORS
 layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
 #elif PART == PT_BLEND_MARKS
-layout(std430, binding = BIND_colors) buffer colors_block { uint marks[]; }; // four a word
+layout(std430, binding = BIND_colors) buffer colors_block { uint marks[]; };
 #else
 layout(std430, binding = BIND_colors) readonly buffer colors_block { uint words[]; };
+#if STEP == 0
+layout(std430, binding = BIND_marks) readonly buffer marks_block { uint marks[]; };
+#include "lib/marks.glsl"
+#endif
 #endif
 layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
-layout(std430, binding = BIND_normal) buffer normal_block { vec4 normal[]; };
 #if PART == PT_BLEND_LIGHT
 layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { uint lost[]; }; // of each light, a plane
 #else
@@ -37,6 +40,7 @@ layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { vec4 albed
 layout(std430, binding = BIND_away) writeonly buffer away_block { float away_from[]; }; // how many pixels the key's point fell away
 
 #if STEP == 1
+layout(std430, binding = BIND_normal) buffer normal_block { vec4 normal[]; };
 layout(std430, binding = BIND_offset) writeonly buffer offset_block { float offset_of[]; };
 #endif
 
@@ -162,7 +166,7 @@ void add_pixel(view_args view, disc d, uint id, int x, int y, look l)
     if (!(pt_float(key.y) <= z && z <= farthest))
         return;
 #if PART == PT_BLEND_MARKS
-    atomicOr(marks[d.id >> 2], l.mark);
+    atomicOr(marks[2u * (d.id / PT_MARK_SLOTS)], l.mark);
 #else
 #if PART == PT_BLEND_COLORS
     if (key.x == id) {
@@ -183,9 +187,15 @@ look look_of(disc d)
     look l;
     precise float opaque = opacity_of(d.id - first_slot) * PT_SUM_SCALE;
     l.opaque = opaque;
+    bool shadowed = discs[instance].shadowed != 0u;
+    uint stride = discs[instance].instance.slots, word = d.id;
+    if (shadowed && args.marked != 0u) {
+        stride = 1u;
+        word = args.step * pt_shown_place(d.id);
+    }
     for (uint k = 0u; k < PT_BLEND_LIGHTS; k++) {
-        bool known = k < args.lights && discs[instance].shadowed != 0u;
-        uint at = (args.first + k) * discs[instance].instance.slots + d.id;
+        bool known = k < args.lights && shadowed;
+        uint at = (args.first + k) * stride + word;
         precise float share = known ? float(words[at] & PT_SHADOW_SUM) * args.scales[k] : 0.0;
         precise float lost = pt_min(share, 1.0) * opaque;
         l.lost[k] = lost;
@@ -193,7 +203,7 @@ look look_of(disc d)
     return l;
 }
 #elif PART == PT_BLEND_MARKS
-look look_of(disc d) { return look(discs[instance].shadowed << 8u * (d.id & 3u)); }
+look look_of(disc d) { return look(discs[instance].shadowed << d.id % PT_MARK_SLOTS); }
 #else
 look look_of(disc d)
 {

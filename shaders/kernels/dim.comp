@@ -7,7 +7,6 @@
 #include "shared/words.h"
 #include "lib/points.glsl"
 #include "lib/positions.glsl"
-#include "lib/shadow_words.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -15,6 +14,9 @@ layout(std430, binding = BIND_arguments) readonly buffer arguments_block { dim_a
 layout(std430, binding = BIND_veil) readonly buffer veil_block { float veil[]; };
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = BIND_marks) readonly buffer marks_block { uint marks[]; };
+#include "lib/marks.glsl"
+#include "lib/shadow_words.glsl"
+
 layout(std430, binding = BIND_shadows) buffer shadows_block { uint words[]; };
 layout(std430, binding = BIND_differs) buffer differs_block { uint differs[]; };
 
@@ -68,13 +70,14 @@ void main()
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         uint id = chunk.first + i;
-        if (args.marked != 0u && (marks[id >> 2] >> 8u * (id & 3u) & 255u) == 0u)
+        if (args.marked != 0u && !pt_is_shown(id))
             continue;
         uint loss = loss_of(view, chunk, base, i);
         if (!all && loss == 0u)
             continue;
         bool differ;
-        words[args.base + id] = pt_shadow_note(words[args.base + id], loss, whole, args.samples, differ);
+        uint at = args.base + pt_word_at(args.marked, args.step, id);
+        words[at] = pt_shadow_note(words[at], loss, whole, args.samples, differ);
         if (differ && args.compare != 0u)
             differs[0] = 1u;
     }

@@ -3,12 +3,13 @@
 // native/device_cpu/kernels/mark.c
 #version 430 core
 #include "shared/shadows.h"
+#include "shared/words.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { mark_args args; };
-layout(std430, binding = BIND_marks) buffer marks_block { uint marks[]; }; // four a word
+layout(std430, binding = BIND_marks) buffer marks_block { uint marks[]; };
 
 void main()
 {
@@ -19,6 +20,6 @@ void main()
         uvec2 key = read_key(here.y * view.width + here.x);
         uint id = key.x - id_base;
         if (id - id_first < id_count && key.y != PT_KEY_EMPTY_Z)
-            atomicOr(marks[id >> 2], 1u << 8u * (id & 3u));
+            atomicOr(marks[2u * (id / PT_MARK_SLOTS)], 1u << id % PT_MARK_SLOTS);
     }
 }

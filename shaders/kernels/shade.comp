@@ -26,9 +26,11 @@ layout(std430, binding = BIND_shading) writeonly buffer shading_block { vec4 sha
 layout(std430, binding = BIND_color) writeonly buffer color_block { vec4 color[]; };
 layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
 layout(std430, binding = BIND_shadows) readonly buffer shadows_block { uint shadows[]; };
+layout(std430, binding = BIND_marks) readonly buffer marks_block { uint marks[]; };
 layout(std430, binding = BIND_arrived) writeonly buffer arrived_block { float arrived[]; };
 
 #include "lib/albedo.glsl"
+#include "lib/marks.glsl"
 #include "lib/recolor.glsl"
 
 float opacity_of(float instance_opacity, uint id, uint at)
@@ -203,8 +205,14 @@ void main()
             float shadow = 1.0;
 #if LIT
             bool of_pixels = args.of_pixels != 0u;
-            vec3 c = phong(view, eye_z, factors, shininess, of_pixels ? own.source : id,
-                           of_pixels ? view.width * view.height : args.instance.slots, p, shadow);
+            uint word = of_pixels ? own.source : id, stride = of_pixels ? view.width * view.height : args.instance.slots;
+#if CASTING
+            if (args.marked != 0u) {
+                word = args.step * pt_shown_place(id);
+                stride = 1u;
+            }
+#endif
+            vec3 c = phong(view, eye_z, factors, shininess, word, stride, p, shadow);
 #else
             vec3 c = p.albedo;
 #endif

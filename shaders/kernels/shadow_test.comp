@@ -9,7 +9,6 @@
 #include "lib/points.glsl"
 #include "lib/positions.glsl"
 #include "lib/by_pixel.glsl"
-#include "lib/shadow_words.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -17,6 +16,9 @@ layout(std430, binding = BIND_arguments) readonly buffer arguments_block { shado
 layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = BIND_surfels) readonly buffer surfels_block { uint surfels[]; };
 layout(std430, binding = BIND_marks) readonly buffer marks_block { uint marks[]; };
+#include "lib/marks.glsl"
+#include "lib/shadow_words.glsl"
+
 layout(std430, binding = BIND_shadows) buffer shadows_block { uint words[]; };
 layout(std430, binding = BIND_differs) buffer differs_block { uint differs[]; };
 
@@ -141,11 +143,11 @@ void main()
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         uint id = chunk.first + i;
-        if (args.marked != 0u && (marks[id >> 2] >> 8u * (id & 3u) & 255u) == 0u)
+        if (args.marked != 0u && !pt_is_shown(id))
             continue;
         uint pixel;
         bool shadowed = in_shadow(view, chunk, i, pixel);
-        if ((all || shadowed) && note(args.base + id, shadowed ? loss_at(pixel) : 0u) && args.compare != 0u)
+        if ((all || shadowed) && note(args.base + pt_word_at(args.marked, args.step, id), shadowed ? loss_at(pixel) : 0u) && args.compare != 0u)
             differs[0] = 1u;
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shadow words: what a sample's maps take of a point's light; twin of native/device_cpu/kernels/shadow_words.h
+// Shadow words: what a sample's maps take of a point's light. Include it behind lib/marks.glsl; twin of native/device_cpu/kernels/shadow_words.h
 #ifndef PT_SHADOW_WORDS_GLSL
 #define PT_SHADOW_WORDS_GLSL
 
@@ -18,5 +18,8 @@ uint pt_shadow_note(uint word, uint loss, bool whole, uint samples, out bool dif
     differ = whole && sum + lost != samples * lost;
     return whole ? sum + lost : sum | lost << PT_SHADOW_SHIFT;
 }
+
+// Where the word of a slot lies, behind the light's first.
+uint pt_word_at(uint marked, uint step, uint slot) { return step * (marked != 0u ? pt_shown_place(slot) : slot); }
 
 #endif

@@ -70,6 +70,7 @@ struct shade_args {
     uint32_t of_pixels; // 1: shadow words are those that discs blended to, of the pixel where the surface was measured
     uint32_t light_count, light_types; // of light_view; bits 1 << those that are among them
     uint32_t casting;             // so many of them have shadow words that are read; 0: the instance receives no shadows
+    uint32_t marked, step;        // 1: words are those of shown points, `step` a point; 0: of a light those of all slots. Not of pixels
     float scales[PT_MAX_LIGHTS];  // of the sums of these words, as light_args.shadow counts: 1 / (255 samples)
     struct recolor_args recolor;
 };

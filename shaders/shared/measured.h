@@ -47,8 +47,8 @@ struct resolve_args {
 //   albedo: mean colour, each disc weighted by its opacity too, and the mean opacity.
 //   offset: with `depths`, how far behind the nearest surface the discs within PT_DISC_DEPTHS d_eff lie in the mean, by the same weights.
 // Other parts of it, of the same discs:
-//   MARKS: a byte of 1 for every point whose disc counts anywhere, in place of colours, and for what others a device likes. No plane is
-//   written.
+//   MARKS: a bit for every point whose disc counts anywhere, as mark has it, in place of colours, and for what others a device likes.
+//   No plane is written.
 //   LIGHT: shadow words in place of colours; albedo: a plane a casting light of the share that does not arrive, in the mean, by the
 //   weights that colours have, in 1 / PT_SHADOW_SUM. Instances that receive no shadows lose nothing.
 struct blend_args {
@@ -59,6 +59,7 @@ struct blend_args {
     uint32_t part;   // PT_BLEND_*
     uint32_t first, lights;        // LIGHT: of so many casting lights from this one on
     float scales[PT_BLEND_LIGHTS]; // of a word's sum, 1 / (255 samples)
+    uint32_t marked, step;         // LIGHT: as in shade_args
 };
 
 // center: the tangent plane n . (p - q) = 0 of a measured point q, d pixels before the middle of its pixel, met by the ray r there:

@@ -14,10 +14,15 @@
 // shadow_test: a texel this many times its d_eff behind the one beside it shows another surface, under lights that look in perspective.
 #define PT_SHADOW_APART 4.0f
 
-// mark: a byte of 1 for every point that the picture shows, measured or as the source of filled pixels.
+// mark: a bit for every point that the picture shows, measured or as the source of filled pixels: PT_MARK_SLOTS.
 struct mark_args {
     struct view_args view;
     uint32_t id_base, id_first, id_count; // as in instance_args
+};
+
+// rank: of the chunks' slots, marks that have no rank get one, in any order.
+struct rank_args {
+    struct view_args view; // of the picture; not read
 };
 
 // shadow_test: points against the filled map of a light [D 6], SPEC 4. A point is in shadow if z > z_map + d_eff, d_eff of the point in
@@ -34,12 +39,13 @@ struct shadow_test_args {
     struct instance_args instance; // of the receiver: d_min, spacing, normals towards the light
     float window[4];  // x0, y0, x1, y1: pixels of the full picture that count
     uint32_t base;    // first of the light's words
+    uint32_t step;    // from a point's word to the next one's: 1, or, marked, as many as there are lights
     uint32_t loss;    // 1..255: what the casters of this map take from 255
     uint32_t alone;   // 1: the sample's only map
     uint32_t close;   // 1: the sample's last map: its loss goes into the sum. 0 when alone
     uint32_t samples; // with this one
     uint32_t compare; // 1: differs[0] becomes 1 unless every point's samples lost the same
-    uint32_t marked;  // 1: only points with a mark
+    uint32_t marked;  // 1: only points with a mark; their words lie by rank, not by slot
     uint32_t faint, caster; // caster: id_base of the only cloud that casts
 };
 
@@ -49,7 +55,7 @@ struct shadow_test_args {
 struct dim_args {
     struct view_args view; // of the map
     float window[4];       // as in shadow_test_args, as are these:
-    uint32_t base, alone, close, samples, compare, marked;
+    uint32_t base, step, alone, close, samples, compare, marked;
     uint32_t veils;        // slabs of the plane
     float veil_from, veil_scale; // as in soft_args; 1 / veil_deep
 };

@@ -61,6 +61,13 @@
 // of the current sample take, 0..255.
 #define PT_SHADOW_SUM 0x000FFFFFu
 #define PT_SHADOW_SHIFT 24
+
+// Of points that a picture shows, where whole shadow textures are not asked for: for every so many slots of a cloud two words. Bit i of
+// the first: slot i is shown. The second is their rank, which of the shown points, of all clouds, the first of them is, from 1 on; 0:
+// it has none yet. Those behind it follow: pt_shown_place. Shadow words of shown points lie side by side, those of one point's lights
+// together; the first place is nobody's.
+#define PT_MARK_SLOTS 32
+
 // What a station saw: see reopen.
 #define PT_SIGHT_BEND 1.25f // a tangent u lies at (1.25 - 0.25 u^2) u on its face: cells are 0.75 to 1 of a face's mean angle wide
 #define PT_SIGHT_SHIFT 12   // 11 bits of mantissa and 5 of exponent are kept of a range: 0.05 %

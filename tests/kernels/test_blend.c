@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // blend: means of the discs on each pixel's nearest surface, over keys that splat made.
 #include "discs.h"
+#include "marks.h"
 #include "shared/measured.h"
 
 #include <math.h>
@@ -78,7 +79,7 @@ struct scenery {
     const struct planes *planes;
     const struct ref_disc *discs;
     uint32_t count;
-    struct pt_buffer *buffers[PLANES + 6 * MOST_INSTANCES];
+    struct pt_buffer *buffers[PLANES + PT_EACH_blend * MOST_INSTANCES];
     uint32_t buffer_count;
     double open;
 };
@@ -90,10 +91,10 @@ static const struct ref_disc *nearest_of(const struct scenery *s, size_t p)
 
 // lists: of each instance, in place of its colours. plane: in place of albedo, or NULL.
 static void run_part(struct harness *h, const struct scenery *s, struct blend_args blend, struct pt_buffer *const *lists,
-                     struct pt_buffer *plane)
+                     struct pt_buffer *const *marks, struct pt_buffer *plane)
 {
     char args[sizeof(struct blend_args) + sizeof s->scene->discs];
-    struct pt_buffer *buffers[PLANES + 6 * MOST_INSTANCES];
+    struct pt_buffer *buffers[PLANES + PT_EACH_blend * MOST_INSTANCES];
     struct disc_args discs[MOST_INSTANCES];
     const uint32_t instances = s->scene->points.count;
     memcpy(buffers, s->buffers, sizeof buffers);
@@ -102,6 +103,7 @@ static void run_part(struct harness *h, const struct scenery *s, struct blend_ar
     memcpy(discs, s->scene->discs, sizeof discs);
     for (uint32_t i = 0; i < instances; i++) {
         buffers[PT_BUF_blend_colors + PT_EACH_blend * i] = lists[i];
+        buffers[PT_BUF_blend_marks + PT_EACH_blend * i] = marks ? marks[i] : NULL;
         discs[i].shadowed = i != BARE;
     }
     blend.view = s->scene->points.view;
@@ -119,8 +121,9 @@ static size_t check_marks(struct harness *h, const struct scenery *s)
     uint8_t *counts = harness_alloc(h, s->count + 1);
     size_t marked = 0;
     for (uint32_t i = 0; i < points->count; i++)
-        marks[i] = harness_buffer(h, harness_alloc(h, points->clouds[i].slots + 4), (points->clouds[i].slots + 3) / 4 * 4);
-    run_part(h, s, (struct blend_args){.part = PT_BLEND_MARKS}, marks, NULL);
+        marks[i] = harness_buffer(h, harness_alloc(h, marks_size(points->clouds[i].slots)),
+                                  marks_size(points->clouds[i].slots));
+    run_part(h, s, (struct blend_args){.part = PT_BLEND_MARKS}, marks, NULL, NULL);
     const void *kept = harness_kept(h);
     if (kept)
         memcpy(counts, kept, s->count + 1);
@@ -138,15 +141,16 @@ static size_t check_marks(struct harness *h, const struct scenery *s)
     }
     harness_keep(h, counts, s->count + 1);
     for (uint32_t i = 0; i < points->count; i++) {
-        const uint8_t *got = harness_read(h, marks[i]);
+        const uint32_t *got = harness_read(h, marks[i]);
         const struct instance_args *args = &s->scene->discs[i].instance;
         for (uint32_t k = 0; k < s->count; k++) {
             const uint32_t at = s->discs[k].id - args->id_base;
             if (at >= args->id_count)
                 continue;
-            marked += got[at];
-            if (got[at] > (i != BARE) || got[at] < (i != BARE && counts[k]))
-                harness_fail(h, "marks", (int)at, (int)i, "got %u where %u counts", got[at], counts[k]);
+            const int shown = ref_shown(got, at);
+            marked += (size_t)shown;
+            if (shown > (i != BARE) || shown < (i != BARE && counts[k]))
+                harness_fail(h, "marks", (int)at, (int)i, "got %d where %u counts", shown, counts[k]);
         }
     }
     return marked;
@@ -162,6 +166,36 @@ static struct ref_look light_of(const struct scenery *s, uint32_t *const *words,
             look.color[k] = i == BARE ? 0.0 : (words[i][lights[k] * (size_t)slots + at] & PT_SHADOW_SUM) / (255.0 * SAMPLES);
     }
     return look;
+}
+
+// The same words by rank, every point's lights together, give the same.
+static void check_ranked(struct harness *h, const struct scenery *s, struct blend_args args, uint32_t *const *words,
+                         const uint32_t *expected)
+{
+    const struct scene *points = &s->scene->points;
+    const size_t pixels = (size_t)points->view.width * points->view.height, size = LIGHTS * pixels * 4;
+    struct pt_buffer *marks[MOST_INSTANCES], *lists[MOST_INSTANCES], *plane = harness_buffer(h, harness_alloc(h, size), size);
+    uint32_t slots = 0, places = 1;
+    for (uint32_t i = 0; i < points->count; i++)
+        slots += points->clouds[i].slots;
+    uint8_t *all = memset(harness_alloc(h, slots + 1), 1, slots);
+    uint32_t *ranked = harness_alloc(h, LIGHTS * (slots + (size_t)1) * 4);
+    for (uint32_t i = 0; i < points->count; i++) {
+        const uint32_t own = points->clouds[i].slots, *each = marks_of(h, all, own, places, &places);
+        marks[i] = harness_buffer(h, each, marks_size(own));
+        for (size_t k = 0; k < LIGHTS * (size_t)own; k++)
+            ranked[LIGHTS * (size_t)ref_shown_place(each, (uint32_t)(k % own)) + k / own] = words[i][k];
+    }
+    lists[0] = harness_buffer(h, ranked, LIGHTS * (slots + (size_t)1) * 4);
+    for (uint32_t i = 1; i < points->count; i++)
+        lists[i] = lists[0];
+    args.marked = 1;
+    args.step = LIGHTS;
+    for (args.first = 0; args.first < LIGHTS; args.first += args.lights) {
+        args.lights = LIGHTS - args.first < PT_BLEND_LIGHTS ? LIGHTS - args.first : PT_BLEND_LIGHTS;
+        run_part(h, s, args, lists, marks, plane);
+    }
+    HARNESS_CHECK(h, !memcmp(harness_read(h, plane), expected, size));
 }
 
 static void check_light(struct harness *h, const struct scenery *s)
@@ -187,9 +221,10 @@ static void check_light(struct harness *h, const struct scenery *s)
         args.scales[k] = 1.0f / (255.0f * SAMPLES);
     for (; args.first < LIGHTS; args.first += args.lights) {
         args.lights = LIGHTS - args.first < PT_BLEND_LIGHTS ? LIGHTS - args.first : PT_BLEND_LIGHTS;
-        run_part(h, s, args, lists, plane);
+        run_part(h, s, args, lists, NULL, plane);
     }
     const uint32_t *got = harness_read(h, plane);
+    check_ranked(h, s, args, words, got);
     harness_same(h, "light", got, LIGHTS * pixels, 4, 1, points->view.width);
     if (harness_settled(h))
         return;
@@ -256,6 +291,7 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
         buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->slots);
         buffers[n++] = harness_buffer(h, paint->colors[i], paint->color_bytes[i]);
         buffers[n++] = harness_buffer(h, paint->opacities[i], cloud->slots + 4);
+        buffers[n++] = NULL; // marks
     }
     const struct blend_args blend = {.view = points->view, .instances = points->count, .depths = depths};
     memcpy(args, &blend, head);

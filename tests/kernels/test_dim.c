@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // dim: points before, in and behind the slabs of a light's view; what samples and maps add up to.
+#include "marks.h"
 #include "points.h"
 #include "shared/balls.h"
 #include "shared/shadows.h"
@@ -8,14 +9,22 @@
 #include <math.h>
 #include <string.h>
 
-enum { CHUNKS = 3, POINTS = 1000, SLOTS = CHUNKS * 1024, OTHERS = 7, WIDTH = 41, HEIGHT = 29 };
+enum {
+    CHUNKS = 3,
+    POINTS = 1000,
+    SLOTS = CHUNKS * 1024,
+    OTHERS = 7,
+    LIGHTS = 3,
+    WORDS = LIGHTS * (SLOTS + 1) + OTHERS,
+    WIDTH = 41,
+    HEIGHT = 29
+};
 
 struct setup {
     struct dim_args args;
     struct chunk_view chunks[CHUNKS];
     float *positions, *veil;
-    uint32_t *words;
-    uint8_t *marks;
+    uint32_t *words, *marks;
 };
 
 // Looks as the map's view does: object and view space are the same, but for z.
@@ -34,6 +43,7 @@ static void set_chunk(const struct view_args *view, struct chunk_view *chunk)
 static struct setup make(struct harness *h, struct rng *rng, int perspective, uint32_t veils)
 {
     struct setup s = {.args = {.view = picture_view(WIDTH, HEIGHT, perspective),
+                               .step = 1,
                                .alone = 1,
                                .samples = 1,
                                .veils = veils,
@@ -45,8 +55,8 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, ui
     s.args.window[2] = (float)(view->origin_x + WIDTH);
     s.args.window[3] = (float)(view->origin_y + HEIGHT);
     s.positions = harness_alloc(h, SLOTS * 12);
-    s.words = harness_alloc(h, (SLOTS + OTHERS) * 4);
-    s.marks = harness_alloc(h, SLOTS);
+    s.words = harness_alloc(h, WORDS * 4);
+    uint8_t *shown = harness_alloc(h, SLOTS);
     s.veil = harness_alloc(h, (size_t)WIDTH * HEIGHT * veils * 4);
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) { // grows with depth; some rays meet nothing
         double sum = 0.0;
@@ -70,7 +80,9 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, ui
     }
     points_settle(s.chunks, CHUNKS, s.positions);
     for (uint32_t i = 0; i < SLOTS; i++)
-        s.marks[i] = (uint8_t)rng_below(rng, 2);
+        shown[i] = (uint8_t)rng_below(rng, 2);
+    uint32_t words;
+    s.marks = marks_of(h, shown, SLOTS, 1, &words);
     return s;
 }
 
@@ -90,24 +102,25 @@ static void check(struct harness *h, const struct setup *s, uint32_t base)
 {
     struct dim_args args = s->args;
     uint32_t differs = 0, expected_differs = 0, tested = 0;
+    uint8_t *own = harness_alloc(h, WORDS);
     args.base = base;
     struct pt_buffer *veil = harness_buffer(h, s->veil, (size_t)WIDTH * HEIGHT * args.veils * 4);
     struct pt_buffer *chunks = harness_buffer(h, s->chunks, sizeof s->chunks);
     struct pt_buffer *positions = points_positions(h, s->chunks, CHUNKS, s->positions, SLOTS),
-                     *marks = harness_buffer(h, s->marks, SLOTS);
-    struct pt_buffer *words = harness_buffer(h, s->words, (SLOTS + OTHERS) * 4), *flag = harness_buffer(h, &differs, 4);
+                     *marks = harness_buffer(h, s->marks, marks_size(SLOTS));
+    struct pt_buffer *words = harness_buffer(h, s->words, WORDS * 4), *flag = harness_buffer(h, &differs, 4);
     HARNESS_RUN(h, dim, &args, veil, chunks, positions, marks, words, flag);
     const uint32_t *got = harness_read(h, words), *got_flag = harness_read(h, flag);
     for (uint32_t c = 0; c < CHUNKS; c++)
         for (uint32_t i = 0; i < s->chunks[c].count; i++) {
-            const uint32_t id = s->chunks[c].first + i, word = s->words[base + id], now = got[base + id];
+            const uint32_t id = s->chunks[c].first + i;
             static const double none[2] = {0.0, 0.0};
             double loss[2];
-            if (args.marked && !s->marks[id]) {
-                if (now != word)
-                    harness_fail(h, "unmarked", (int)id, 0, "was tested");
+            if (args.marked && !ref_shown(s->marks, id))
                 continue;
-            }
+            const uint32_t at = base + args.step * (args.marked ? ref_shown_place(s->marks, id) : id), word = s->words[at],
+                           now = got[at];
+            own[at] = 1;
             const enum ref_truth inside = ref_dim(&args, s->veil, &s->chunks[c], s->positions, i, loss);
             tested += loss[1] > 0.5;
             expected_differs |= (args.alone || args.close) &&
@@ -120,9 +133,9 @@ static void check(struct harness *h, const struct setup *s, uint32_t base)
     HARNESS_CHECK(h, tested > POINTS || args.marked);
     if (args.compare)
         HARNESS_CHECK(h, (*got_flag != 0) == (expected_differs != 0));
-    for (uint32_t i = 0; i < base; i++)
-        if (got[i] != s->words[i])
-            harness_fail(h, "another light", (int)i, 0, "was written");
+    for (uint32_t i = 0; i < WORDS; i++)
+        if (!own[i] && got[i] != s->words[i])
+            harness_fail(h, "another's", (int)i, 0, "was written");
 }
 
 static void maps(struct harness *h)
@@ -134,7 +147,8 @@ static void maps(struct harness *h)
             struct setup s = make(h, &rng, p, counts[k]);
             check(h, &s, k ? OTHERS : 0);
             s.args.marked = 1;
-            check(h, &s, 0);
+            s.args.step = LIGHTS;
+            check(h, &s, (uint32_t)k);
         }
 }
 
@@ -149,7 +163,7 @@ static void samples(struct harness *h)
             s.args.close = mode == 1;
             s.args.samples = 5;
             s.args.compare = compare;
-            for (uint32_t k = 0; k < SLOTS + OTHERS; k++)
+            for (uint32_t k = 0; k < WORDS; k++)
                 s.words[k] = rng_below(&rng, 4 * 255 + 1) | (mode ? rng_below(&rng, 256) << PT_SHADOW_SHIFT : 0);
             check(h, &s, 0);
         }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // mark: exactly the points that the picture shows.
-#include "harness.h"
+#include "marks.h"
 #include "shared/shadows.h"
 
 #include <string.h>
@@ -12,19 +12,22 @@ static void check(struct harness *h, const struct picture *picture, const uint32
     args.id_first = slots / 8;                                 // and those before these
     args.id_count = slots - args.id_first;
     memcpy(args.view.rect, rect, sizeof args.view.rect);
-    size_t size = (slots + 3) / 4 * 4;
-    uint8_t *before = harness_alloc(h, size ? size : 4);
+    const size_t size = marks_size(slots + 1);
+    uint32_t *before = harness_alloc(h, size);
     struct pt_buffer *keys = harness_buffer(h, picture->keys, picture->count * 8);
-    struct pt_buffer *marks = harness_buffer(h, before, size ? size : 4);
+    struct pt_buffer *marks = harness_buffer(h, before, size);
     HARNESS_RUN(h, mark, &args, keys, marks);
-    const uint8_t *got = harness_read(h, marks);
+    const uint32_t *got = harness_read(h, marks);
     struct ref_planes planes = picture_planes(picture);
     for (uint32_t id = 0; id < slots; id++)
-        if (got[id] != (id >= args.id_first && ref_mark(&args, &planes, id)))
-            harness_fail(h, "mark", (int)id, 0, "got %u", got[id]);
-    for (size_t i = slots; i < size; i++)
-        if (got[i])
+        if (ref_shown(got, id) != (id >= args.id_first && ref_mark(&args, &planes, id)))
+            harness_fail(h, "mark", (int)id, 0, "got %d", ref_shown(got, id));
+    for (uint32_t i = slots; i < size / 8 * PT_MARK_SLOTS; i++)
+        if (ref_shown(got, i))
             harness_fail(h, "beyond", (int)i, 0, "was marked");
+    for (size_t i = 0; i < size / 8; i++)
+        if (got[2 * i + 1])
+            harness_fail(h, "rank", (int)i, 0, "was written");
 }
 
 static void pictures(struct harness *h)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // shade: colours of every format, normals measured, filled, blended and estimated, Phong light.
-#include "harness.h"
+#include "marks.h"
 #include "shared/colors.h"
 
 #include <math.h>
@@ -15,7 +15,8 @@ struct setup {
     size_t colors_size;
     uint8_t *opacities;
     uint32_t *shadows; // two lights; room for as many pixels
-    float *shading;    // before
+    uint32_t *marks;
+    float *shading; // before
 };
 
 static struct setup make(struct harness *h, struct rng *rng, int perspective, enum picture_kind kind, uint32_t format)
@@ -49,7 +50,10 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
         instance->color[c] = (float)rng_unit(rng);
         s.lights.world[c] = (float)rng_unit(rng);
     }
-    s.shadows = harness_alloc(h, s.picture.count * 8);
+    uint8_t *shown = memset(harness_alloc(h, instance->slots + 1u), 1, instance->slots); // as a picture does
+    uint32_t places;
+    s.marks = marks_of(h, shown, instance->slots, 1, &places);
+    s.shadows = harness_alloc(h, s.picture.count * 8 + 8);
     for (size_t i = 0; i < (size_t)instance->slots * 2; i++)
         s.shadows[i] = rng_below(rng, 255 * 8 + 1) | (uint32_t)rng_next(rng) << PT_SHADOW_SHIFT; // 8 samples
     s.args.arrived = format != 1;
@@ -89,7 +93,8 @@ static void check(struct harness *h, struct setup *s, double most_open)
     struct pt_buffer *normal = harness_buffer(h, picture->normal, count * 16);
     struct pt_buffer *deff = harness_buffer(h, picture->deff, count * 4);
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->colors_size);
-    struct pt_buffer *shadows = harness_buffer(h, s->shadows, count * 8);
+    struct pt_buffer *shadows = harness_buffer(h, s->shadows, count * 8 + 8);
+    struct pt_buffer *marks = harness_buffer(h, s->marks, marks_size(s->args.instance.slots));
     struct pt_buffer *shading = harness_buffer(h, s->shading, count * 16);
     struct pt_buffer *color = harness_buffer(h, unset, count * 16), *arrived = harness_buffer(h, unset, count * 4);
     struct pt_buffer *opacities = harness_buffer(h, s->opacities, s->opacities ? s->args.instance.slots : 0);
@@ -98,12 +103,13 @@ static void check(struct harness *h, struct setup *s, double most_open)
     s->args.light_types = 0;
     for (uint32_t i = 0; i < s->args.light_count; i++)
         s->args.light_types |= 1u << s->lights.each[i].type;
-    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color, opacities, shadows, arrived, lights,
-                ramps);
+    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color, opacities, shadows, marks, arrived,
+                lights, ramps);
     const float *got = harness_read(h, color), *got_n = harness_read(h, shading), *got_share = harness_read(h, arrived);
     struct ref_planes planes = picture_planes(picture);
     planes.colors = s->colors;
     planes.shadows = s->shadows;
+    planes.marks = s->marks;
     planes.opacities = s->opacities;
     planes.lights = &s->lights;
     planes.ramps = s->ramps;
@@ -292,6 +298,24 @@ static void shapes(struct harness *h)
     }
 }
 
+// Words of shown points, by rank.
+static void ranked(struct harness *h)
+{
+    for (uint64_t seed = 40; seed < 46; seed++) {
+        struct rng rng = {seed};
+        struct setup s = make(h, &rng, seed % 2 ? 1 : 0, PICTURE_SURFACES, (uint32_t)seed % 3);
+        cast_by_points(&s);
+        s.args.marked = 1;
+        s.args.step = 2;
+        s.args.blend = seed % 3;
+        for (uint32_t i = 0; i < 2 * (s.args.instance.slots + 1); i++)
+            s.shadows[i] = rng_below(&rng, 255 * 8 + 1) | (uint32_t)rng_next(&rng) << PT_SHADOW_SHIFT;
+        for (uint32_t i = 0; i < s.args.light_count; i++)
+            s.lights.each[i].shadow = i % 3;
+        check(h, &s, TOL_UNSURE_SHARE);
+    }
+}
+
 // What discs blended to in place of points' words, from none to all of the light.
 static void pixels(struct harness *h)
 {
@@ -435,6 +459,7 @@ int main(int argc, char **argv)
         {"lights", lights, 0},
         {"spots and panels", shapes, 0},
         {"shadow words of pixels", pixels, 0},
+        {"words of shown points", ranked, 0},
         {"ambient light by direction", directed, 0},
         {"sanity of ramps", ramp_sanity, 1},
         {"ramps, exposure, contrast", ramps, 0},

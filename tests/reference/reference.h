@@ -192,7 +192,8 @@ struct ref_planes {
     const float *obscured;
     const float *albedo;     // colours without light
     const float *slopes;     // NULL: none
-    const uint32_t *shadows; // words, by light and id - id_base
+    const uint32_t *shadows; // words, by light and id - id_base, or as marks say
+    const uint32_t *marks;
     const struct light_view *lights;
     const float *ramps;
 };
@@ -305,6 +306,9 @@ struct ref_slope ref_slope(const struct slope_args *args, const struct ref_plane
 
 // Does the picture show the point `id` of the instance somewhere in its rectangle?
 int ref_mark(const struct mark_args *args, const struct ref_planes *planes, uint32_t id);
+// Marks: PT_MARK_SLOTS. Is the point of this slot shown, and where do its shadow words lie?
+int ref_shown(const uint32_t *marks, uint32_t slot);
+uint32_t ref_shown_place(const uint32_t *marks, uint32_t slot);
 
 // Exact. planes: of the light's map, with the caster's opacities.
 float ref_limit(const struct limit_args *args, const struct ref_planes *planes, int x, int y);

@@ -304,9 +304,11 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
         const struct light_args *light = &planes->lights->each[i];
         double share = 1.0;
         if (args->casting && light->shadow) {
-            size_t word = args->of_pixels
-                              ? (light->shadow - 1) * (size_t)view->width * view->height +
-                                    (planes->from[pixel] & ~PT_FROM_MIXED)
+            size_t word = args->of_pixels ? (light->shadow - 1) * (size_t)view->width * view->height +
+                                                (planes->from[pixel] & ~PT_FROM_MIXED)
+                          : args->marked
+                              ? args->step * (size_t)ref_shown_place(planes->marks, ref_key_id(key) - instance->id_base) +
+                                    (light->shadow - 1)
                               : (light->shadow - 1) * (size_t)instance->slots + (ref_key_id(key) - instance->id_base);
             share -= (planes->shadows[word] & PT_SHADOW_SUM) * (double)args->scales[light->shadow - 1];
             arrived += share;

@@ -615,7 +615,7 @@ static void test_light_and_ramps_are_shared(void **state)
         assert_int_equal(args.casting, instance == 2);
         assert_int_equal(args.recolor.first, instance == 1 ? 2 : 0);
         assert_true((pass->late == PT_LATE_POINTS) == (instance == 2));
-        pt_plan_late(pass, (const uint32_t[PT_MAX_LIGHTS]){5}, &args);
+        pt_plan_late(pass, &(struct pt_words){.samples = {5}}, &args);
         assert_true(args.scales[0] == (instance == 2 ? 1.0f / (255.0f * 5.0f) : 0.0f));
     }
     assert_int_equal(shades, 4);

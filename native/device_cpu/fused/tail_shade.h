@@ -16,9 +16,12 @@ static void ask_for_colors(const struct tail *tail, const struct pt_seen_row *se
         const struct shade_args *args = tail->passes[i].call.arguments;
         const char *colors = PT_DATA(&tail->passes[i].call, shade, colors);
         const size_t bytes = pt_color_bytes[args->instance.color_format], size = lies_far(&args->instance, bytes) ? bytes : 0;
-        const uint32_t *words = PT_DATA(&tail->passes[i].call, shade, shadows);
-        const uint32_t casting = args->of_pixels ? 0 : args->casting; // those lie as the pixels do
-        for (uint32_t x = seen->first; (size || casting) && x < seen->end; x += PT_LANES) {
+        const uint32_t *words = PT_DATA(&tail->passes[i].call, shade, shadows),
+                       *marks = PT_DATA(&tail->passes[i].call, shade, marks);
+        const uint32_t casting = args->of_pixels || args->marked ? 0
+                                                                 : args->casting; // those lie as the pixels do, or side by side
+        const int marked = args->casting && args->marked;
+        for (uint32_t x = seen->first; (size || casting || marked) && x < seen->end; x += PT_LANES) {
             size_t at = (size_t)y * view->width + x;
             vi id;
             vm ours = pt_of_instance(tail->planes.keys + at, &args->instance, pt_lanes_left(x, view->width), &id);
@@ -28,6 +31,8 @@ static void ask_for_colors(const struct tail *tail, const struct pt_seen_row *se
             vi_store(points, vi_select(ours, id, vi_set(0)));
             for (uint32_t k = 0; k < PT_LANES && size; k++)
                 __builtin_prefetch(colors + size * points[k], 0, 1); // into the second level
+            for (uint32_t k = 0; k < PT_LANES && marked; k++)
+                __builtin_prefetch(marks + 2 * (size_t)(points[k] / PT_MARK_SLOTS), 0, 1);
             for (uint32_t l = 0; l < casting; l++)
                 for (uint32_t k = 0; k < PT_LANES; k++)
                     __builtin_prefetch(words + (size_t)l * args->instance.slots + points[k], 0, 1);
@@ -78,7 +83,8 @@ static inline __attribute__((always_inline)) void light_row(const struct tail *t
                                                             const struct pt_cpu_call *call, int32_t y, int plain)
 {
     const struct shade_args args = *(const struct shade_args *)call->arguments;
-    const struct pt_lights lights = pt_lights_of(&args, PT_DATA(call, shade, lights), PT_DATA(call, shade, shadows));
+    const struct pt_lights lights = pt_lights_of(&args, PT_DATA(call, shade, lights), PT_DATA(call, shade, shadows),
+                                                 PT_DATA(call, shade, marks));
     const struct pt_planes planes = tail->planes;
     const struct pt_color_row out = walk->shaded[slot(tail, y)];
     const int shows_normals = tail->shows_normals, shows_shadow = tail->extract && tail->extract->shadow;

@@ -5,6 +5,7 @@
 // Tile by tile. The sums of a pixel lie side by side, one vector whatever the instruction set; they are 32 bits wide and emptied into
 // 64 before they could overflow.
 #include "bins.h"
+#include "marks.h"
 #include "sums.h"
 #include "shared/measured.h"
 
@@ -94,14 +95,18 @@ static inline void set_light_terms(const struct pt_bins *bins, uint32_t instance
 {
     const struct blend_args *args = arguments_of(bins);
     const struct disc_args *disc = &bins->discs[instance];
-    const uint32_t *words = PT_DATA_EACH(bins->call, blend, colors, instance);
+    const uint32_t *words = PT_DATA_EACH(bins->call, blend, colors, instance),
+                   *marks = PT_DATA_EACH(bins->call, blend, marks, instance);
     const vf opaque = opaque_of(bins, instance, discs);
+    const int shadowed = args->lights && disc->shadowed;
+    const vi at = shadowed && args->marked ? pt_shown_words(marks, args->step, discs->id, discs->drawn) : discs->id;
+    const size_t stride = args->marked ? 1 : disc->instance.slots;
     vf terms[SUMS];
     for (uint32_t k = 0; k < PT_BLEND_LIGHTS; k++) {
         terms[k] = vf_zero();
-        if (k >= args->lights || !disc->shadowed)
+        if (k >= args->lights || !shadowed)
             continue;
-        const vi word = vi_gather(words + (size_t)(args->first + k) * disc->instance.slots, discs->id, discs->drawn);
+        const vi word = vi_gather(words + (args->first + k) * stride, at, discs->drawn);
         const vf lost = vi_convert(vi_and(word, vi_set(PT_SHADOW_SUM))) * vf_set(args->scales[k]);
         terms[k] = vf_min(lost, vf_set(1.0f)) * opaque;
     }
@@ -210,11 +215,11 @@ static inline void take_room(struct tile *tile, float size)
 static inline void draw_marks(void *context, uint32_t instance, const struct pt_discs *discs)
 {
     const struct tile *tile = context;
-    uint8_t *marks = PT_DATA_EACH(tile->bins->call, blend, colors, instance);
+    uint32_t *marks = PT_DATA_EACH(tile->bins->call, blend, colors, instance);
     uint32_t ids[PT_LANES];
     vi_store(ids, discs->id);
     for (uint32_t some = tile->bins->discs[instance].shadowed ? vm_bits(discs->drawn) : 0; some; some &= some - 1)
-        __atomic_store_n(marks + ids[__builtin_ctz(some)], 1, __ATOMIC_RELAXED);
+        pt_mark(marks, ids[__builtin_ctz(some)]);
 }
 
 static inline void draw(void *context, uint32_t instance, const struct pt_discs *discs)

@@ -64,13 +64,13 @@ static uint32_t dim_chunk(const struct dim *dim, const struct chunk_view *chunk)
 {
     const struct dim_args *args = dim->args;
     const uint32_t *points = pt_chunk_points(PT_DATA(dim->call, dim, positions), chunk);
-    const uint8_t *marks = PT_DATA(dim->call, dim, marks); // none where none are asked for
-    uint32_t *words = (uint32_t *)PT_DATA(dim->call, dim, shadows) + args->base + chunk->first, differs = 0;
+    const uint32_t *marks = PT_DATA(dim->call, dim, marks); // none where none are asked for
+    uint32_t *words = (uint32_t *)PT_DATA(dim->call, dim, shadows) + args->base, differs = 0;
     const int whole = args->alone || args->close, all = args->close || args->compare;
     for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(i, chunk->count));
         if (args->marked)
-            lanes = pt_marked(marks, chunk->first + i, lanes);
+            lanes = pt_are_shown(marks, chunk->first + i, lanes);
         if (!vm_bits(lanes))
             continue;
         uint32_t losses[PT_LANES];
@@ -78,7 +78,8 @@ static uint32_t dim_chunk(const struct dim *dim, const struct chunk_view *chunk)
         for (uint32_t left = vm_bits(lanes); left; left &= left - 1) {
             const uint32_t k = (uint32_t)__builtin_ctz(left);
             if (all || losses[k])
-                differs |= pt_shadow_note(words + i + k, losses[k], whole, args->samples);
+                differs |= pt_shadow_note(words + pt_word_at(marks, args->marked, args->step, chunk->first + i + k), losses[k],
+                                          whole, args->samples);
         }
     }
     return differs;

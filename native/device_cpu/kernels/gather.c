@@ -81,7 +81,7 @@ static inline void light(const struct gather *gather, const struct points *point
     for (int k = 0; k < 3; k++) // without one: across the view
         n[k] = vf_select(known, n[k] * scale, k == 2 ? one : zero);
     const struct pt_lights lights = pt_lights_of(args, PT_DATA(gather->call, gather, lights),
-                                                 PT_DATA(gather->call, gather, shadows));
+                                                 PT_DATA(gather->call, gather, shadows), NULL);
     pt_phong(args, 0, &lights, ray, points->id, points->some, points->z, n, color);
 }
 

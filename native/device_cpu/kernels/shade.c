@@ -31,7 +31,7 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
           *arrived = PT_DATA(shade->call, shade, arrived);
     const uint64_t *keys = shade->planes.keys + (size_t)y * args->view.width;
     const struct pt_lights lights = pt_lights_of(args, PT_DATA(shade->call, shade, lights),
-                                                 PT_DATA(shade->call, shade, shadows));
+                                                 PT_DATA(shade->call, shade, shadows), PT_DATA(shade->call, shade, marks));
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         if (args->instance.color_format)
             pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, PT_DATA(shade->call, shade, colors),

@@ -4,6 +4,7 @@
 #define PT_SHADE_H
 
 #include "device_cpu/kernels/blend_normals.h"
+#include "device_cpu/kernels/marks.h"
 #include "device_cpu/kernels/recolor.h"
 
 static const uint32_t pt_color_bytes[] = {0, 3, 12, 0, 4, 0}; // of a point, by color_format
@@ -105,18 +106,25 @@ static inline vf pt_power(vf x, uint32_t exponent)
     return result;
 }
 
-// The light, what comes from all around alike, and shadow words: those of a light lie `stride` apart from the next one's.
+// The light, what comes from all around alike, and shadow words: those of a light lie `stride` apart from the next one's; of shown points,
+// where marks say so.
 struct pt_lights {
     const struct light_view *view;
-    const uint32_t *words;
+    const uint32_t *words, *marks;
     size_t stride;
     float around[3];
 };
 
-static inline struct pt_lights pt_lights_of(const struct shade_args *args, const struct light_view *view, const uint32_t *words)
+static inline struct pt_lights pt_lights_of(const struct shade_args *args, const struct light_view *view, const uint32_t *words,
+                                            const uint32_t *marks)
 {
     const size_t pixels = (size_t)args->view.width * args->view.height;
-    struct pt_lights lights = {.view = view, .words = words, .stride = args->of_pixels ? pixels : args->instance.slots};
+    struct pt_lights lights = {.view = view,
+                               .words = words,
+                               .marks = marks,
+                               .stride = args->of_pixels ? pixels
+                                         : args->marked  ? 1
+                                                         : args->instance.slots};
     for (int k = 0; k < 3 && args->instance.lit; k++)
         lights.around[k] = args->instance.ambient * view->world[k];
     return lights;
@@ -296,8 +304,10 @@ static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct sha
         return vf_set(1.0f);
     vf ray[2];
     vf_ray(&args->view, x, y, ray);
-    return pt_phong(args, plain, lights, ray, args->of_pixels ? pt_source(planes, at) : id, ours, vf_load(own->z + x), normal,
-                    color);
+    vi word = args->of_pixels ? pt_source(planes, at) : id;
+    if (!plain && args->marked)
+        word = pt_shown_words(lights->marks, args->step, id, ours);
+    return pt_phong(args, plain, lights, ray, word, ours, vf_load(own->z + x), normal, color);
 }
 
 #endif

@@ -188,13 +188,13 @@ static void fill_queue(const struct shadow_test *test, const struct chunk_view *
                        struct queue *queue)
 {
     const struct shadow_test_args *args = &test->args;
-    const uint8_t *marks = PT_DATA(test->call, shadow_test, marks); // none where none are asked for
+    const uint32_t *marks = PT_DATA(test->call, shadow_test, marks); // none where none are asked for
     const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
     queue->count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(i, last));
         if (args->marked)
-            lanes = pt_marked(marks, chunk->first + i, lanes);
+            lanes = pt_are_shown(marks, chunk->first + i, lanes);
         if (!vm_bits(lanes))
             continue;
         vf p[3];
@@ -211,16 +211,18 @@ static uint32_t test_points(const struct shadow_test *test, const struct chunk_v
                             uint32_t at)
 {
     const struct shadow_test_args *args = &test->args;
-    uint32_t *words = (uint32_t *)PT_DATA(test->call, shadow_test, shadows) + args->base + chunk->first, differs = 0;
+    const uint32_t *marks = PT_DATA(test->call, shadow_test, marks);
+    uint32_t *words = (uint32_t *)PT_DATA(test->call, shadow_test, shadows) + args->base, differs = 0;
     const vm lanes = vm_first(pt_lanes_left(at, queue->count));
     const struct fall fall = queued(queue, at, lanes);
     const vi id = vi_add(vi_load(queue->slot + at), vi_set(chunk->first));
     const uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(test, &fall, id) : 0;
     for (uint32_t left = args->close || args->compare ? vm_bits(lanes) : shadowed; left; left &= left - 1) {
-        const uint32_t k = (uint32_t)__builtin_ctz(left);
+        const uint32_t k = (uint32_t)__builtin_ctz(left), slot = chunk->first + queue->slot[at + k];
         // 4. what the sample takes goes into the word
-        differs |= pt_shadow_note(words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(test, queue->texel[at + k]) : 0,
-                                  args->alone || args->close, args->samples);
+        differs |= pt_shadow_note(words + pt_word_at(marks, args->marked, args->step, slot),
+                                  shadowed >> k & 1u ? loss_at(test, queue->texel[at + k]) : 0, args->alone || args->close,
+                                  args->samples);
     }
     return differs;
 }

@@ -4,6 +4,7 @@
 #define PT_SHADOW_WORDS_H
 
 #include "device_cpu/rows.h"
+#include "marks.h"
 
 // a b / 255 of a, b up to 255, rounded: exact.
 static inline uint32_t pt_shadow_share(uint32_t a, uint32_t b)
@@ -12,11 +13,10 @@ static inline uint32_t pt_shadow_share(uint32_t a, uint32_t b)
     return (product + (product >> 8)) >> 8;
 }
 
-// Those of `lanes` whose points, from `slot` on, have a mark.
-static inline vm pt_marked(const uint8_t *marks, uint32_t slot, vm lanes)
+// Where the word of a slot lies, behind the light's first.
+static inline size_t pt_word_at(const uint32_t *marks, uint32_t marked, uint32_t step, uint32_t slot)
 {
-    const vi mark = vi_and(vi_gather_bytes(marks, vi_add(vi_set(slot), vi_lanes()), lanes), vi_set(255));
-    return vm_and(lanes, vm_not(vi_eq(mark, vi_set(0))));
+    return (size_t)step * (marked ? pt_shown_place(marks, slot) : slot);
 }
 
 // Those of `lanes` that fall into the window and do not lie before the map; at: x, y, z.

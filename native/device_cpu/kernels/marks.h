@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Marks of points that a picture shows, and where their shadow words lie: PT_MARK_SLOTS. Twin of shaders/lib/marks.glsl.
+#ifndef PT_MARKS_H
+#define PT_MARKS_H
+
+#include "device_cpu/vector_math.h"
+
+// Those of `lanes` whose points, from `slot` on, are shown. Slots of a vector share a word.
+static inline vm pt_are_shown(const uint32_t *marks, uint32_t slot, vm lanes)
+{
+    return vm_and(lanes, vm_of_bits(marks[2 * (slot / PT_MARK_SLOTS)] >> slot % PT_MARK_SLOTS));
+}
+
+// Which of the shown points it is; 0, which is nobody's place: none of them.
+static inline uint32_t pt_shown_place(const uint32_t *marks, uint32_t slot)
+{
+    const uint32_t *pair = marks + 2 * (size_t)(slot / PT_MARK_SLOTS), own = 1u << slot % PT_MARK_SLOTS;
+    return pair[0] & own ? pair[1] + (uint32_t)__builtin_popcount(pair[0] & (own - 1)) : 0;
+}
+
+// Of `lanes`, times step.
+static inline vi pt_shown_words(const uint32_t *marks, uint32_t step, vi slots, vm lanes)
+{
+    uint32_t at[PT_LANES];
+    vi_store(at, vi_select(lanes, slots, vi_set(0)));
+    for (uint32_t some = vm_bits(lanes); some; some &= some - 1) {
+        const uint32_t k = (uint32_t)__builtin_ctz(some);
+        at[k] = step * pt_shown_place(marks, at[k]);
+    }
+    return vi_load(at);
+}
+
+// Two threads, or a point and another in its word, may mark at once.
+static inline void pt_mark(uint32_t *marks, uint32_t slot)
+{
+    uint32_t *word = marks + 2 * (size_t)(slot / PT_MARK_SLOTS);
+    const uint32_t bit = 1u << slot % PT_MARK_SLOTS;
+    if (!(__atomic_load_n(word, __ATOMIC_RELAXED) & bit))
+        __atomic_fetch_or(word, bit, __ATOMIC_RELAXED);
+}
+
+#endif

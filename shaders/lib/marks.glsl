@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Marks of points that a picture shows, and where their shadow words lie: PT_MARK_SLOTS. Include it behind the block of marks; twin of
+// native/device_cpu/kernels/marks.h
+#ifndef PT_MARKS_GLSL
+#define PT_MARKS_GLSL
+
+bool pt_is_shown(uint slot) { return (marks[2u * (slot / PT_MARK_SLOTS)] >> slot % PT_MARK_SLOTS & 1u) != 0u; }
+
+// Which of the shown points it is; 0, which is nobody's place: none of them.
+uint pt_shown_place(uint slot)
+{
+    uint at = 2u * (slot / PT_MARK_SLOTS), bits = marks[at], own = 1u << slot % PT_MARK_SLOTS;
+    return (bits & own) != 0u ? marks[at + 1u] + uint(bitCount(bits & (own - 1u))) : 0u;
+}
+
+#endif
