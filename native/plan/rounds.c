@@ -4,6 +4,7 @@
 #include "slots.h"
 
 #include "shared/points.h"
+#include "shared/shadows.h"
 
 int pt_pass_divides(const struct pt_pass *pass)
 {
@@ -33,6 +34,16 @@ uint32_t pt_pass_keys(const struct pt_pass *pass, uint32_t *width, uint32_t *hei
     *width = args->view.width;
     *height = args->view.height;
     return PT_BUF_scatter_keys;
+}
+
+int pt_pass_marks(const struct pt_pass *pass)
+{
+    switch (pass->kernel) {
+    case PT_KERNEL_shadow_test:
+        return ((const struct shadow_test_args *)pass->arguments)->marked ? PT_BUF_shadow_test_marks : -1;
+    case PT_KERNEL_dim: return ((const struct dim_args *)pass->arguments)->marked ? PT_BUF_dim_marks : -1;
+    default: return -1;
+    }
 }
 
 static uint32_t array_bit(enum pt_instance_buffer which, const struct patina_cloud *cloud)

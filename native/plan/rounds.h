@@ -38,6 +38,8 @@ enum pt_pass_role {
 enum pt_pass_role pt_pass_role(const struct pt_pass *pass);
 // Of a pass whose role is PT_ROLE_KEYS: which of its references the keys are, and how many of them a row has.
 uint32_t pt_pass_keys(const struct pt_pass *pass, uint32_t *width, uint32_t *height);
+// Which of its references are the marks of the points that it looks at, of its one list; -1: it looks at all.
+int pt_pass_marks(const struct pt_pass *pass);
 // Whether it writes least keys of points.
 static inline int pt_is_of_parts(const struct pt_pass *pass) { return pt_pass_role(pass) >= PT_ROLE_KEYS; }
 // The lists of a pass, all their chunks; lists: room for as many as the pass has references. Returns how many.

@@ -287,8 +287,8 @@ static void expect(const struct pt_chunk_list *lists, uint32_t count, const stru
 }
 
 struct bound {
-    const struct pt_chunk_list *lists;
-    struct pt_buffer *parts; // of the lists
+    const struct pt_chunk_list *lists, *all; // all: before chunks without a mark were left out
+    struct pt_buffer *parts;                 // of the lists
     struct pt_buffer **buffers;
     uint32_t count;
     uint64_t most;           // bytes that a range reads
@@ -346,7 +346,7 @@ static int check_range(struct pt_pager *pager, const struct pt_pass *pass, const
 {
     const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, NULL, NULL};
     const int found = pt_check_range(&how, drawn->lists, &drawn->range);
-    const int more = found == PT_AGAIN ? check_lists(pager, pass, bound->lists, bound->count) : PATINA_OK;
+    const int more = found == PT_AGAIN ? check_lists(pager, pass, bound->all, bound->count) : PATINA_OK;
     return more < 0 ? more : found;
 }
 
@@ -372,13 +372,45 @@ static int run_ranges(struct pt_pager *pager, const struct pt_pass *pass, struct
     return error;
 }
 
+// Whether some slot of the chunk is marked: PT_MARK_SLOTS.
+static int is_marked(const uint32_t *marks, const struct chunk_view *chunk)
+{
+    for (uint32_t slot = chunk->first, end = chunk->first + chunk->padded; slot < end;) {
+        const uint32_t at = slot % PT_MARK_SLOTS, left = PT_MARK_SLOTS - at, count = left < end - slot ? left : end - slot;
+        const uint32_t own = (count < PT_MARK_SLOTS ? (1u << count) - 1 : UINT32_MAX) << at;
+        if (marks[2 * (size_t)(slot / PT_MARK_SLOTS)] & own)
+            return 1;
+        slot += count;
+    }
+    return 0;
+}
+
+// Leaves out the chunks that no point of is marked: nothing of them is tested, and nothing need be read. Returns where the list lies from
+// now on; NULL: as it was.
+static struct chunk_view *keep_marked(const struct pt_pager *pager, const struct pt_pass *pass,
+                                      struct pt_buffer *const *buffers, struct pt_chunk_list *list)
+{
+    const int ref = pager->cap ? pt_pass_marks(pass) : -1;
+    struct chunk_view *kept = ref < 0 ? NULL : malloc((list->count + 1) * sizeof *kept);
+    uint32_t count = 0;
+    if (!kept)
+        return NULL;
+    for (uint32_t c = 0; c < list->count; c++)
+        if (is_marked(buffers[ref]->data, &list->chunks[c]))
+            kept[count++] = list->chunks[c];
+    list->chunks = kept;
+    list->count = count;
+    return kept;
+}
+
 int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
                  struct pt_buffer *const *buffers, pt_run_bound *run, void *context)
 {
     if (!pager || !pager->mapped || pager->device->copies) // which looks after its ranges itself
         return run(context, buffers);
-    struct pt_chunk_list *lists = calloc(pass->ref_count + 1u, sizeof *lists);
+    struct pt_chunk_list *lists = calloc(2 * (pass->ref_count + 1u), sizeof *lists);
     struct bound bound = {.lists = lists, .most = pager->round};
+    struct chunk_view *marked = NULL;
     uint64_t bytes = 0;
     uint32_t ranges = 0;
     if (lists) {
@@ -388,12 +420,14 @@ int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struc
             list->chunks = buffers[list->ref]->data ? buffers[list->ref]->data : list->chunks;
             list->count = (uint32_t)(buffers[list->ref]->size / sizeof *list->chunks);
         }
+        bound.all = memcpy(lists + pass->ref_count + 1, lists, bound.count * sizeof *lists);
+        marked = bound.count == 1 ? keep_marked(pager, pass, buffers, &lists[0]) : NULL;
         ranges = pt_count_ranges(lists, bound.count, pager->cap ? pager->round : UINT64_MAX, &bytes);
         ranges = ranges > 1 && !pt_pass_divides(pass) ? 1 : ranges;
         pager->rounds = ranges > pager->rounds ? ranges : pager->rounds;
     }
     const int hiding = hides(pager, pass, bytes);
-    if (ranges > 1 || hiding) {
+    if (ranges > 1 || hiding || marked) {
         bound.parts = calloc(bound.count, sizeof *bound.parts);
         bound.buffers = calloc(pass->ref_count, sizeof *bound.buffers);
     }
@@ -409,6 +443,7 @@ int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struc
         error = error ? error : run(context, buffers);
     }
     pt_hiding_end(&bound.hiding);
+    free(marked);
     free(lists);
     free(bound.parts);
     free(bound.buffers);
