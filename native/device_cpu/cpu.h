@@ -23,7 +23,8 @@ struct pt_cpu_call {
     struct pt_cpu_scratch *scratch; // [PT_CPU_SCRATCHES], kept between calls
 };
 
-enum { PT_CPU_SCRATCHES = 2 };
+// SPARSE: of which a call writes here and there a little: it comes in small pages.
+enum { PT_CPU_SPARSE = 2, PT_CPU_SCRATCHES };
 
 // Scratch memory of at least `size` bytes, contents undefined, grown if need be. NULL when memory lacks.
 void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size);

@@ -351,7 +351,7 @@ static int allocate(struct fill *fill)
     // every pixel may be kept, and be filled again in this step
     fill->band_entries = 2 * (size_t)view->width * BAND_ROWS + PT_LANES;
     size_t words = fill->words * (view->height + 2) + 2, room = count * fill->band_entries + PT_LANES;
-    uint8_t *lists = pt_cpu_scratch(fill->call, 1, room * 44);
+    uint8_t *lists = pt_cpu_scratch(fill->call, PT_CPU_SPARSE, room * 44); // few pixels change
     uint64_t *bits = pt_cpu_scratch(fill->call, 0, words * PLANES * 8 + count * 8);
     if (!lists || !bits)
         return PATINA_ERROR_MEMORY;
