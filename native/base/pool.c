@@ -251,7 +251,8 @@ static void close_job(struct pt_pool *pool)
         pause_a_moment();
     }
     pt_mutex_lock(&pool->lock);
-    atomic_store(&pool->waits, 1);
+    // An exchange: who leaves must not miss it, and emulators of ARM let a load behind a plain store go first.
+    atomic_exchange(&pool->waits, 1);
     while (atomic_load(&pool->inside))
         pt_condition_wait(&pool->done, &pool->lock);
     atomic_store(&pool->waits, 0);
