@@ -20,8 +20,8 @@ void pt_detail_begin(const struct patina_scene *scene, const struct pt_plan *pla
 {
     const struct patina_cloud *cloud = instance->whole; // levels are those of all its parts
     *detail = (struct pt_detail){0};
-    // Cells of range images, discs alone and maps of lights know no coarser points: a map's holes would be light.
-    if (!(scene->settings.detail > 0.0f) || plan->map || scene->settings.surface == PATINA_SURFACE_SPLATS ||
+    // Cells of range images, and discs alone, know no coarser points.
+    if (!(scene->settings.detail > 0.0f) || scene->settings.surface == PATINA_SURFACE_SPLATS ||
         pt_draws_ranges(scene, plan, instance))
         return;
     double finest, coarsest;

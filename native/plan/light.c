@@ -76,10 +76,25 @@ int pt_mesh_receives(const struct pt_instance *instance)
 // Meshes are opaque, and among the opaque casters of everyone.
 static int meshes_cast(const struct pt_shadow_group *group) { return !group || group->only == PT_NO_INSTANCE; }
 
+// Words of whole textures that are kept at the most: a gigabyte of them.
+static uint64_t most_words(void)
+{
+    const char *told = getenv("PATINA_SHADOW_WORDS");
+    return told && *told ? strtoull(told, NULL, 10) : 1ull << 28;
+}
+
+static int are_too_many(const struct patina_scene *scene, const struct pt_plan *plan)
+{
+    uint64_t words = 0;
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
+        words += pt_receives(&scene->instances[i]) ? plan->light_count * scene->instances[i].cloud->slots : 0;
+    return words > most_words();
+}
+
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan)
 {
-    return scene->settings.shadow_lazy && plan->layers <= 1 && !(scene->settings.shadow_error > 0.0f) &&
-           !pt_soft_receives(scene);
+    const int asked = scene->settings.shadow_lazy == 1 || (!scene->settings.shadow_lazy && are_too_many(scene, plan));
+    return asked && plan->layers <= 1 && !(scene->settings.shadow_error > 0.0f) && !pt_soft_receives(scene);
 }
 
 // What it takes of 255 parts of light.

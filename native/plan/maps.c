@@ -7,6 +7,10 @@
 
 #include <string.h>
 
+// Texels between points, where the picture need not be exact: filling closes what they leave open, and where it could not light would
+// come through.
+#define MAP_DETAIL 1.0f
+
 // Whether an instance, or PT_PIXELS, is tested against the group's maps.
 static int receives(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
                     uint32_t group, uint32_t instance)
@@ -272,6 +276,8 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
     if (error ||
         !pt_light_scene(scene, &picture->lights[round->light], group, round->sample, round->face, instances, &view, window))
         return error;
+    if (scene->settings.detail > 0.0f && pt_plan_lazy(scene, picture)) // textures that are kept serve exact pictures too
+        view.settings.detail = MAP_DETAIL;
     pt_handle_init(&view.handle);
     if (group->soft) {
         map->soft.veils = pt_veil_slabs(&view);

@@ -266,11 +266,11 @@ static void plan_marks(struct pt_builder *builder)
     int lazy = pt_plan_lazy(builder->scene, plan);
     if (none || !lazy)
         pt_skip(builder, "mark",
-                none                                   ? none
-                : plan->layers > 1                     ? "what later layers show is not known yet"
-                : pt_soft_receives(builder->scene)     ? "soft points all take shadows"
-                : builder->scene->settings.shadow_lazy ? "the error target is measured on whole shadow textures"
-                                                       : "whole shadow textures, to be kept");
+                none                                           ? none
+                : plan->layers > 1                             ? "what later layers show is not known yet"
+                : pt_soft_receives(builder->scene)             ? "soft points all take shadows"
+                : builder->scene->settings.shadow_error > 0.0f ? "the error target is measured on whole shadow textures"
+                                                               : "whole shadow textures, to be kept");
     if (none)
         pt_skip(builder, "shadow_test", none);
     if (none || !pt_casts_in_layers(builder->scene))

@@ -11,8 +11,7 @@
 
 enum { ERROR_MOST = 256 }; // samples, where an error is asked for
 
-// Of all that a pixel's shadow depends on but the lights: where the camera is, what the planes hold, where meshes are.
-static uint64_t view_of(const struct patina_scene *scene, const struct pt_plan *plan)
+uint64_t pt_pixels_view(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     const patina_camera *c = &scene->camera;
     const double window[] = {c->left, c->right, c->bottom, c->top, c->near_clip, c->far_clip, (double)c->orthographic};
@@ -44,7 +43,7 @@ static uint32_t samples_of(const struct patina_scene *scene, const struct pt_pla
 int pt_pixels_open(struct patina_device *device, struct pt_shadow_pixels *pixels, const struct patina_scene *scene,
                    const struct pt_plan *plan, int changed)
 {
-    const uint64_t count = (uint64_t)plan->view.width * plan->view.height, view = view_of(scene, plan);
+    const uint64_t count = (uint64_t)plan->view.width * plan->view.height, view = pt_pixels_view(scene, plan);
     pixels->pending = 0;
     if (!plan->mesh.shadows)
         return PATINA_OK;

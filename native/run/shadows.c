@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { MOST_SAMPLES = 4096 }; // of a light
+
 static void forget_lights(struct pt_shadows *shadows)
 {
     for (uint32_t i = 0; i < shadows->light_count; i++)
@@ -105,9 +107,9 @@ uint32_t pt_samples_wanted(const struct pt_shadows *shadows, const struct patina
     const struct pt_plan_light *planned = &plan->lights[i];
     if (light->settled)
         return light->samples;
-    if (!scene->settings.shadow_progressive || pt_plan_lazy(scene, plan))
+    if (!scene->settings.shadow_progressive || scene->settings.shadow_lazy == 1)
         return planned->samples;
-    const uint32_t next = light->samples ? 2 * light->samples : 1;
+    const uint32_t next = pt_plan_lazy(scene, plan) ? shadows->next : light->samples ? 2 * light->samples : 1;
     return next < planned->samples ? next : planned->samples;
 }
 
@@ -158,6 +160,7 @@ int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, co
                     const struct pt_plan *plan)
 {
     const int lazy = pt_plan_lazy(scene, plan);
+    const uint64_t view = pt_pixels_view(scene, plan);
     int error = PATINA_OK, changed = 0;
     if (!plan->light_count)
         return PATINA_OK;
@@ -169,6 +172,10 @@ int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, co
         changed = 1;
     }
     error = error ? error : match_lights(device, shadows, scene, plan, &changed);
+    shadows->next = changed || view != shadows->view || !shadows->next ? 1
+                    : shadows->next < MOST_SAMPLES                     ? 2 * shadows->next
+                                                                       : shadows->next;
+    shadows->view = view;
     if (!error && lazy && !shadows->of_marked &&
         pt_shadows_stale(shadows, scene, plan)) { // what was whole is not whole any more
         error = pt_shadows_make_places(device, shadows, scene, plan->light_count, 1);

@@ -29,6 +29,8 @@ struct pt_shadows {
     struct pt_buffer *words, *marks; // per instance of the scene; empty where it receives none
     struct pt_buffer shown;          // words of marked points, of all instances, in place of theirs
     uint32_t of_marked;              // 1: those are meant
+    uint32_t next;                   // samples that they get, where these come by and by: more at each picture of one view
+    uint64_t view;                   // of what picture that is
     uint32_t placed;                 // they have room, and no samples yet
     uint64_t *fingerprints;          // per instance: of whose points the words are; 0: none
     uint32_t instance_count;
@@ -66,6 +68,8 @@ void pt_shadows_release(struct patina_device *device, struct pt_shadows *shadows
 
 // ---- shadow_pixels.c -----------------------------------------------------------------------------------------------------
 
+// Of all that what a picture shows depends on but the lights: where the camera is, what the planes hold, where meshes are.
+uint64_t pt_pixels_view(const struct patina_scene *scene, const struct pt_plan *plan);
 // Room for the picture's words and how many samples they get; changed: some light is not as it was.
 int pt_pixels_open(struct patina_device *device, struct pt_shadow_pixels *pixels, const struct patina_scene *scene,
                    const struct pt_plan *plan, int changed);

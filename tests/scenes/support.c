@@ -376,3 +376,15 @@ patina_scene *scene_of(const patina_cloud *cloud, const patina_cloud_style *styl
     CHECK(patina_scene_add_cloud(scene, cloud, style), scene);
     return scene;
 }
+
+void support_set_variable(const char *name, const char *value)
+{
+#ifdef _WIN32
+    _putenv_s(name, value ? value : "");
+#else
+    if (value)
+        setenv(name, value, 1);
+    else
+        unsetenv(name);
+#endif
+}

@@ -29,6 +29,7 @@ const char *support_message(const void *handle); // static buffer
 
 // ---- devices: `--device NAME` (may be repeated) or `--device all`, the default -------------------------------------
 
+void support_set_variable(const char *name, const char *value); // of the environment; NULL: there is none
 void support_arguments(int argc, char **argv);
 // Was the program started with `--quick`? Then what is named is left out, and that is said.
 int support_is_quick(const char *left_out);

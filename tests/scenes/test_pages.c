@@ -439,23 +439,11 @@ static void test_colors_before_pictures(void **state)
 
 // ---- clouds in parts ---------------------------------------------------------------------------------------------------
 
-static void set_variable(const char *name, const char *value)
-{
-#ifdef _WIN32
-    _putenv_s(name, value ? value : "");
-#else
-    if (value)
-        setenv(name, value, 1);
-    else
-        unsetenv(name);
-#endif
-}
-
 static patina_cloud *begin_in_parts(const struct tree *tree, uint64_t cap)
 {
-    set_variable("PATINA_PART_SLOTS", "20000");
+    support_set_variable("PATINA_PART_SLOTS", "20000");
     patina_cloud *cloud = begin(tree, cap);
-    set_variable("PATINA_PART_SLOTS", NULL);
+    support_set_variable("PATINA_PART_SLOTS", NULL);
     assert_true(cloud->part_count > 4);
     return cloud;
 }

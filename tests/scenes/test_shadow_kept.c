@@ -159,6 +159,9 @@ static void test_lazy_is_whole(void **state)
             struct picture picture = picture_read(lazy);
             picture_assert_identical(&picture, &first, 0, 0, "lazy shadows");
             picture_free(&picture);
+            patina_frame_stats of_shown = {.struct_size = sizeof of_shown}; // by what shows, and two bits a point
+            CHECK(patina_frame_get_stats(lazy, &of_shown), lazy);
+            assert_in_range(of_shown.shadow_bytes, 4 * 3, 3 * 4 * SIZE * SIZE + (TORUS + FLOOR) / 3);
         }
         assert_int_equal(render(frame, &stage).shadow_maps, 0); // whole ones are at hand
         picture_free(&first);
@@ -235,6 +238,53 @@ static void test_progressive(void **state)
     patina_frame_destroy(direct);
     stage_end(&stage);
     patina_device_destroy(device);
+}
+
+// Whole textures that would be too large: of what shows alone, to the same picture; by and by while the view stays as it is.
+static void test_large_textures(void **state)
+{
+    (void)state;
+    for (uint32_t d = 0; d < support_device_count(); d++) {
+        patina_device *device = support_device_open(support_device_name(d), 0, 0);
+        if (!device)
+            continue;
+        struct stage stage = stage_lit();
+        patina_frame *whole = frame_on(device), *frame = frame_on(device);
+        stage.settings.shadow_samples = 5;
+        render(whole, &stage);
+        struct picture expected = picture_read(whole);
+        support_set_variable("PATINA_SHADOW_WORDS", "1000");
+        assert_in_range(render(frame, &stage).shadow_bytes, 4 * 3, 3 * 4 * SIZE * SIZE + (TORUS + FLOOR) / 3);
+        struct picture picture = picture_read(frame);
+        picture_assert_identical(&picture, &expected, 0, 0, "shadows of what shows");
+        picture_free(&picture);
+        stage.settings.shadow_progressive = 1;
+        for (int view = 0; view < 2; view++) {
+            static const uint32_t samples[] = {1, 2, 4, 5, 5};
+            stage.camera.world_from_camera[3] += 0.1;
+            CHECK(patina_scene_set_camera(stage.scene, &stage.camera), stage.scene);
+            for (int k = 0; k < 5; k++) {
+                const patina_frame_stats stats = render(frame, &stage);
+                assert_int_equal(stats.shadow_samples, samples[k]);
+                assert_int_equal(stats.shadow_pending, k < 3 ? 3 : 0);
+            }
+        }
+        picture_free(&expected);
+        picture = picture_read(frame);
+        support_set_variable("PATINA_SHADOW_WORDS", NULL);
+        stage.settings.shadow_progressive = 0;
+        render(whole, &stage);
+        expected = picture_read(whole);
+        picture_assert_identical(&picture, &expected, 0, 0, "shadows of what shows, by and by");
+        CHECK(patina_frame_bake_shadows(frame, stage.scene), frame); // however large, where they are asked for
+        assert_int_equal(render(frame, &stage).shadow_maps, 0);
+        picture_free(&picture);
+        picture_free(&expected);
+        patina_frame_destroy(whole);
+        patina_frame_destroy(frame);
+        stage_end(&stage);
+        patina_device_destroy(device);
+    }
 }
 
 // With an error target every device stops at the same samples; so do refining step by step and asking for a lazy picture;
@@ -622,6 +672,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_lazy_is_whole),
         cmocka_unit_test(test_what_a_texture_depends_on),
         cmocka_unit_test(test_progressive),
+        cmocka_unit_test(test_large_textures),
         cmocka_unit_test(test_error_target),
         cmocka_unit_test(test_early_stop),
         cmocka_unit_test(test_switches),
