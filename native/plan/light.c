@@ -646,10 +646,11 @@ static void put_matrix(struct key *key, const struct patina_scene *scene, const 
         put(key, moved[k]);
 }
 
-static void put_instance(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned, uint32_t i)
+static void put_instance(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned,
+                         uint64_t identity, uint32_t i)
 {
     const struct pt_instance *instance = &scene->instances[i];
-    put_word(key, pt_cloud_fingerprint(instance->cloud));
+    put_word(key, identity);
     put(key, (double)instance->style.shadow_off);
     put(key, (double)loss_of(instance));
     put(key, (double)instance->style.lighting);
@@ -666,7 +667,8 @@ static void put_instance(struct key *key, const struct patina_scene *scene, cons
     put_cuts(key, scene, instance);
 }
 
-size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *planned, double *numbers, size_t room)
+size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *planned,
+                    uint64_t (*identity)(const struct patina_cloud *cloud), double *numbers, size_t room)
 {
     const patina_light_desc *light = planned->light;
     struct key key = {numbers, 0, room};
@@ -681,7 +683,7 @@ size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light
     put(&key, (double)scene->settings.fill);
     put(&key, (double)scene->settings.shadow_error);
     for (uint32_t i = 0; i < scene->cloud_count; i++)
-        put_instance(&key, scene, planned, i);
+        put_instance(&key, scene, planned, identity(scene->instances[i].cloud), i);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         if (pt_mesh_casts(pt_mesh_at(scene, i))) {
             put_word(&key, atomic_load(&pt_mesh_at(scene, i)->mesh->alive->fingerprint));

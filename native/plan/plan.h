@@ -574,7 +574,8 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
 
 // What a light's texture depends on, in a fixed order: integers as such, lengths and angles relative to the light.
 // Returns the count of numbers; writes at most `room`.
-size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *light, double *numbers, size_t room);
+size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *light,
+                    uint64_t (*identity)(const struct patina_cloud *cloud), double *numbers, size_t room);
 int pt_same_key(const double *a, const double *b, size_t count);
 
 #endif

@@ -200,7 +200,7 @@ static int take_light(struct reader *reader, const struct patina_scene *scene, c
                       struct pt_shadow_light *light)
 {
     uint32_t count = 0;
-    size_t wanted = pt_light_key(scene, &plan->lights[i], NULL, 0);
+    size_t wanted = pt_light_key(scene, &plan->lights[i], pt_cloud_fingerprint, NULL, 0);
     if (take(reader, &light->samples, 4) || take(reader, &light->settled, 4) || take(reader, &light->error, 4) ||
         take(reader, &count, 4))
         return PATINA_ERROR_FORMAT;
@@ -212,7 +212,7 @@ static int take_light(struct reader *reader, const struct patina_scene *scene, c
     if (!error)
         error = take(reader, key, wanted * sizeof *key);
     if (!error) {
-        pt_light_key(scene, &plan->lights[i], ours, wanted);
+        pt_light_key(scene, &plan->lights[i], pt_cloud_fingerprint, ours, wanted);
         if (!pt_same_key(key, ours, wanted))
             error = pt_fail(&reader->frame->handle, PATINA_ERROR_FORMAT,
                             "%s: stale: light %u, a cloud, or how they lie to each other changed since it was baked",

@@ -52,6 +52,12 @@ struct pt_buffer *pt_shadows_buffer(struct pt_shadows *shadows, uint32_t which, 
     return which == PT_MARKS ? &shadows->marks[instance] : &shadows->words[instance];
 }
 
+// Whole textures are good for the same points wherever they lie; words of marked points for one picture, which need not read them for it.
+static uint64_t identity_of(const struct pt_shadows *shadows, const struct pt_instance *instance)
+{
+    return shadows->of_marked && pt_receives(instance) ? pt_cloud_stamp(instance->cloud) : pt_shadows_identity(instance);
+}
+
 uint64_t pt_shadows_identity(const struct pt_instance *instance)
 {
     return pt_receives(instance) ? pt_cloud_fingerprint(instance->cloud) : 0;
@@ -62,7 +68,7 @@ static int same_places(const struct pt_shadows *shadows, const struct patina_sce
 {
     int same = shadows->light_count == plan->light_count && shadows->instance_count == scene->cloud_count;
     for (uint32_t i = 0; same && i < scene->cloud_count; i++)
-        same = shadows->fingerprints[i] == pt_shadows_identity(&scene->instances[i]);
+        same = shadows->fingerprints[i] == identity_of(shadows, &scene->instances[i]);
     return same;
 }
 
@@ -83,7 +89,7 @@ int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shad
     shadows->light_count = light_count;
     for (uint32_t i = 0; i < scene->cloud_count; i++) {
         uint64_t points = scene->instances[i].cloud->slots;
-        shadows->fingerprints[i] = pt_shadows_identity(&scene->instances[i]);
+        shadows->fingerprints[i] = identity_of(shadows, &scene->instances[i]);
         if (!shadows->fingerprints[i] || of_marked)
             continue;
         int error = light_count * points > UINT32_MAX
@@ -140,11 +146,12 @@ static int match_lights(struct patina_device *device, struct pt_shadows *shadows
 {
     for (uint32_t i = 0; i < plan->light_count; i++) {
         struct pt_shadow_light *light = &shadows->lights[i];
-        size_t count = pt_light_key(scene, &plan->lights[i], NULL, 0);
+        uint64_t (*const identity)(const struct patina_cloud *) = shadows->of_marked ? pt_cloud_stamp : pt_cloud_fingerprint;
+        size_t count = pt_light_key(scene, &plan->lights[i], identity, NULL, 0);
         double *key = malloc(count * sizeof *key);
         if (!key)
             return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
-        pt_light_key(scene, &plan->lights[i], key, count);
+        pt_light_key(scene, &plan->lights[i], identity, key, count);
         int known = light->key && light->key_count == count && pt_same_key(light->key, key, count);
         *changed |= !known;
         if (!known || light->partial || (light->samples > plan->lights[i].samples && !light->settled))

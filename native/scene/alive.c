@@ -5,8 +5,10 @@
 
 struct pt_alive *pt_alive_create(void)
 {
+    static _Atomic uint64_t last;
     struct pt_alive *alive = calloc(1, sizeof *alive);
     if (alive) {
+        alive->serial = 1 + atomic_fetch_add(&last, 1);
         atomic_init(&alive->references, 1);
         atomic_init(&alive->alive, 1);
     }

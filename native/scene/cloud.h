@@ -40,6 +40,7 @@ struct pt_alive {
     atomic_uint pages;            // counts how often pages arrived: all arrays are others then
     atomic_uint shapes;           // counts how often surfels and shapes were
     _Atomic uint64_t fingerprint; // 0: nobody has asked for it yet
+    uint64_t serial;              // no other handle of this process has or had it; not 0
 };
 
 enum pt_color_format { PT_COLOR_NONE = 0, PT_COLOR_SRGB8 = 1, PT_COLOR_FLOAT = 2 };
@@ -196,6 +197,9 @@ void pt_cloud_writer_drop(struct pt_cloud_writer *writer); // no file
 // Of positions, normals, spacings and opacities, whatever order they came in; never 0. Made at the first call, which reads
 // them all: only shadows ask. Any thread.
 uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);
+// Which cloud of this process, and in what state: another one where points, normals or spacings may be others since. Reads nothing of them;
+// never 0.
+uint64_t pt_cloud_stamp(const struct patina_cloud *cloud);
 
 struct pt_alive *pt_alive_create(void); // a handle's own, counted once; NULL without memory
 void pt_alive_release(struct pt_alive *alive);

@@ -141,6 +141,12 @@ uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud)
     return known;
 }
 
+uint64_t pt_cloud_stamp(const struct patina_cloud *cloud)
+{
+    const struct pt_alive *alive = cloud->alive;
+    return mix(mix(alive->serial, atomic_load(&alive->pages)), atomic_load(&alive->shapes)) | 1u;
+}
+
 // The bytes of an array and what they mean; `hash` is what came before.
 static uint64_t add_array(uint64_t hash, const patina_array *array, uint64_t count)
 {
