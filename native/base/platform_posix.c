@@ -177,7 +177,12 @@ void *pt_pages_reserve(size_t size)
     void *memory = size > SIZE_MAX / 2 ? MAP_FAILED
                                        : mmap(NULL, whole_pages(size), PROT_READ | PROT_WRITE,
                                               MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    return memory == MAP_FAILED ? NULL : memory;
+    if (memory == MAP_FAILED)
+        return NULL;
+#ifdef MADV_NOHUGEPAGE
+    madvise(memory, whole_pages(size), MADV_NOHUGEPAGE); // where they are huge unasked
+#endif
+    return memory;
 }
 
 int pt_pages_need(void *pages, size_t size) // all of it is there to be written to

@@ -76,7 +76,7 @@ int pt_mesh_receives(const struct pt_instance *instance)
 // Meshes are opaque, and among the opaque casters of everyone.
 static int meshes_cast(const struct pt_shadow_group *group) { return !group || group->only == PT_NO_INSTANCE; }
 
-// Words of whole textures that are kept at the most: a gigabyte of them.
+// Words of whole textures that are kept at the most where they come by and by: a gigabyte of them.
 static uint64_t most_words(void)
 {
     const char *told = getenv("PATINA_SHADOW_WORDS");
@@ -93,8 +93,9 @@ static int are_too_many(const struct patina_scene *scene, const struct pt_plan *
 
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan)
 {
-    const int asked = scene->settings.shadow_lazy == 1 || (!scene->settings.shadow_lazy && are_too_many(scene, plan));
-    return asked && plan->layers <= 1 && !(scene->settings.shadow_error > 0.0f) && !pt_soft_receives(scene);
+    const patina_settings *settings = &scene->settings;
+    return (settings->shadow_lazy || (settings->shadow_progressive && plan->words_are_many)) && plan->layers <= 1 &&
+           !(settings->shadow_error > 0.0f) && !pt_soft_receives(scene);
 }
 
 // What it takes of 255 parts of light.
@@ -562,6 +563,7 @@ void pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan)
         if (light->shadows)
             plan->lights[plan->light_count++] = (struct pt_plan_light){.light = light, .samples = samples};
     }
+    plan->words_are_many = are_too_many(scene, plan);
 }
 
 // ---- what a texture depends on -------------------------------------------------------------------------------------------

@@ -362,6 +362,7 @@ struct pt_plan {
     uint32_t skipped_count;
     struct pt_plan_light lights[PT_MAX_LIGHTS]; // those that cast, in the scene's order
     uint32_t light_count;
+    int words_are_many;       // whole textures of theirs would be too large to be kept
     struct light_view *light; // all of it, as shading reads it; NULL: nothing is lit
     float *ramps;             // of all that has one, a table; equal ones are there once
     uint32_t ramp_entries, ramp_room;
@@ -559,7 +560,6 @@ int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: it
 // with an error target: a part of the picture would stop at other samples than the whole. Not where soft points take shadows: no
 // pixel tells which of them it shows.
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);
-enum { PT_SHADOWS_WHOLE = 2 }; // settings.shadow_lazy: whole textures, however large
 
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups); // at most 3 instances + 1
 int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);

@@ -14,8 +14,7 @@ static int bake_once(struct patina_frame *frame, const struct patina_scene *scen
     (void)of;
     struct patina_scene whole = *scene; // its handle is not touched
     struct pt_plan plan;
-    whole.settings.shadow_lazy = PT_SHADOWS_WHOLE;
-    whole.settings.shadow_progressive = 0;
+    whole.settings.shadow_lazy = whole.settings.shadow_progressive = 0;
     frame->times.count = 0;
     frame->shadow_maps = 0;
     const int known = frame->keys_valid, layers = (int)frame->layer_count;

@@ -64,6 +64,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
         shown->stats.shadow_samples = samples > shown->stats.shadow_samples ? samples : shown->stats.shadow_samples;
         shown->stats.shadow_error = fmaxf(shown->stats.shadow_error, light->error);
     }
+    frame->shadows.reached = shown->stats.shadow_pending ? frame->shadows.next : 0;
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
     frame->skipped_count = plan->skipped_count;
     shown->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;

@@ -124,20 +124,18 @@ int pt_frame_read_ids(const struct patina_frame *frame, const struct patina_scen
     return read_plane(frame, "patina_frame_read_keys", keys, size);
 }
 
-// A buffer's bytes, of which the caller has to dispose; NULL: it cannot be read.
-static void *read_buffer(const struct patina_frame *frame, const struct pt_buffer *buffer, size_t at, size_t size)
+// A buffer's bytes, of which the caller has to dispose.
+static int read_buffer(const struct patina_frame *frame, const struct pt_buffer *buffer, size_t at, size_t size,
+                       uint32_t **words)
 {
-    void *bytes = malloc(size + 1);
-    if (!bytes)
-        pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read_shadows: out of memory");
-    if (bytes && frame->device->ops->buffer_read(frame->device, buffer, at, bytes, size)) {
-        free(bytes);
-        return NULL;
-    }
-    return bytes;
+    *words = malloc(size + 1);
+    if (!*words)
+        return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read_shadows: out of memory");
+    const int error = frame->device->ops->buffer_read(frame->device, buffer, at, *words, size);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
-// Shadow words of an instance; NULL each: there are none, or they cannot be read.
+// Shadow words of an instance.
 struct words {
     uint32_t *each, *marks; // marks: those of shown points
     uint32_t first, step;   // of the light
@@ -149,7 +147,7 @@ static uint32_t word_of(const struct words *words, uint32_t slot)
         return words->each[slot];
     const uint32_t *pair = words->marks + 2 * (size_t)(slot / PT_MARK_SLOTS), own = 1u << slot % PT_MARK_SLOTS;
     const uint32_t before = (uint32_t)__builtin_popcount(pair[0] & (own - 1));
-    return pair[0] & own ? words->each[(size_t)words->step * (pair[1] + before) + words->first] : 0;
+    return pair[0] & own && pair[1] ? words->each[(size_t)words->step * (pair[1] + before) + words->first] : 0;
 }
 
 // What arrives at the points of an instance, which of a cloud in parts is one of them.
@@ -161,11 +159,10 @@ static int read_part(const struct patina_frame *frame, uint32_t instance, uint32
     struct words words = {.first = light, .step = shadows->light_count};
     if (!bytes && !marks)
         return PATINA_OK; // nothing of it was there
-    if (marks)
-        words.marks = read_buffer(frame, &shadows->marks[instance], 0, marks);
-    words.each = marks ? read_buffer(frame, &shadows->shown, 0, shadows->shown.size)
-                       : read_buffer(frame, &shadows->words[instance], light * bytes, bytes);
-    const int error = !words.each || (marks && !words.marks);
+    int error = marks ? read_buffer(frame, &shadows->marks[instance], 0, marks, &words.marks) : PATINA_OK;
+    if (!error)
+        error = marks ? read_buffer(frame, &shadows->shown, 0, shadows->shown.size, &words.each)
+                      : read_buffer(frame, &shadows->words[instance], light * bytes, bytes, &words.each);
     const float scale = 1.0f / (255.0f * (float)shadows->lights[light].samples);
     for (uint32_t c = 0; c < cloud->chunk_count && !error; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
@@ -174,7 +171,7 @@ static int read_part(const struct patina_frame *frame, uint32_t instance, uint32
     }
     free(words.each);
     free(words.marks);
-    return error ? pt_fail_again(&frame->handle, PATINA_ERROR_MEMORY) : PATINA_OK;
+    return error;
 }
 
 int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t number, uint32_t light, float *values, size_t size)

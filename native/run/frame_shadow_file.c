@@ -102,7 +102,7 @@ int pt_frame_save_shadows(const struct patina_frame *frame, const char *path)
 {
     const struct pt_shadows *shadows = &frame->shadows;
     struct bytes body = {0}, header = {0};
-    int whole = shadows->light_count > 0;
+    int whole = shadows->light_count > 0 && !shadows->of_marked;
     for (uint32_t i = 0; i < shadows->light_count; i++)
         whole &= shadows->lights[i].samples && !shadows->lights[i].partial;
     if (!whole)

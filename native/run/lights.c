@@ -132,6 +132,14 @@ static int measure_error(struct pt_execution *e, uint32_t index, struct pt_shado
     return error;
 }
 
+// A part of a picture looks at its own points alone, which may agree where others do not: it would stop at other samples than the whole.
+static int may_settle(const struct pt_execution *e)
+{
+    const patina_settings *s = &e->scene->settings;
+    const uint32_t whole[4] = {0, 0, s->width, s->height};
+    return !e->binder.shadows->of_marked || !memcmp(s->region, whole, sizeof whole);
+}
+
 // One sample of points; compare: light->settled where all agree.
 static int test_sample(struct pt_execution *e, const struct pt_step *step, uint32_t sample, int compare)
 {
@@ -149,7 +157,7 @@ static int test_sample(struct pt_execution *e, const struct pt_step *step, uint3
     if (error)
         return error;
     light->samples = sample + 1;
-    light->settled = compare && !differs;
+    light->settled = compare && !differs && may_settle(e);
     light->partial = (uint32_t)pt_plan_lazy(e->scene, e->plan);
     return PATINA_OK;
 }

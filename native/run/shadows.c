@@ -5,8 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_SAMPLES = 4096 }; // of a light
-
 static void forget_lights(struct pt_shadows *shadows)
 {
     for (uint32_t i = 0; i < shadows->light_count; i++)
@@ -67,6 +65,10 @@ uint64_t pt_shadows_identity(const struct pt_instance *instance)
 static int same_places(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan)
 {
     int same = shadows->light_count == plan->light_count && shadows->instance_count == scene->cloud_count;
+    for (uint32_t i = 0; same && i < scene->cloud_count && !shadows->of_marked;
+         i++) // ahead of fingerprints, which read all points
+        same = !pt_receives(&scene->instances[i]) ||
+               shadows->words[i].size == shadows->light_count * scene->instances[i].cloud->slots * 4;
     for (uint32_t i = 0; same && i < scene->cloud_count; i++)
         same = shadows->fingerprints[i] == identity_of(shadows, &scene->instances[i]);
     return same;
@@ -113,7 +115,8 @@ uint32_t pt_samples_wanted(const struct pt_shadows *shadows, const struct patina
     const struct pt_plan_light *planned = &plan->lights[i];
     if (light->settled)
         return light->samples;
-    if (!scene->settings.shadow_progressive || scene->settings.shadow_lazy == 1)
+    if (!scene->settings.shadow_progressive || scene->settings.shadow_lazy ||
+        (!shadows->of_marked && light->samples == planned->samples))
         return planned->samples;
     const uint32_t next = pt_plan_lazy(scene, plan) ? shadows->next : light->samples ? 2 * light->samples : 1;
     return next < planned->samples ? next : planned->samples;
@@ -179,9 +182,8 @@ int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, co
         changed = 1;
     }
     error = error ? error : match_lights(device, shadows, scene, plan, &changed);
-    shadows->next = changed || view != shadows->view || !shadows->next ? 1
-                    : shadows->next < MOST_SAMPLES                     ? 2 * shadows->next
-                                                                       : shadows->next;
+    shadows->reached = changed || view != shadows->view ? 0 : shadows->reached;
+    shadows->next = shadows->reached ? 2 * shadows->reached : 1;
     shadows->view = view;
     if (!error && lazy && !shadows->of_marked &&
         pt_shadows_stale(shadows, scene, plan)) { // what was whole is not whole any more
@@ -201,17 +203,17 @@ static int place_marked(struct patina_device *device, struct pt_shadows *shadows
 {
     uint32_t marked = 0;
     int error = pt_flag_read(device, shadows, PT_FLAG_MARKED, &marked);
-    const uint64_t count = (1 + (uint64_t)marked) * shadows->light_count;
-    if (!error && count > UINT32_MAX)
+    const uint64_t size = ((1 + (uint64_t)marked) * shadows->light_count * 4 + 7) / 8 * 8;
+    if (!error && size / 4 > INT32_MAX) // kernels gather by signed indices
         return pt_fail(&device->handle, PATINA_ERROR_TOO_MANY_POINTS,
-                       "shadows of %u lights on %u points: their product must stay below 4294967296", shadows->light_count,
-                       marked);
-    if (!error && shadows->shown.size < count * 4) {
+                       "shadows of %u lights on %u points that the picture shows: their product must stay below 2147483648",
+                       shadows->light_count, marked);
+    if (!error && shadows->shown.size < size) {
         device->ops->buffer_destroy(device, &shadows->shown);
-        error = device->ops->buffer_create(device, count * 4, NULL, 0, &shadows->shown);
+        error = device->ops->buffer_create(device, size, NULL, 0, &shadows->shown);
     }
     shadows->placed = !error;
-    return error ? error : device->ops->buffer_fill(device, &shadows->shown, 0, count * 4, 0, 4);
+    return error ? error : device->ops->buffer_fill(device, &shadows->shown, 0, size, 0, 4);
 }
 
 int pt_shadows_clear(struct patina_device *device, struct pt_shadows *shadows, uint32_t light)

@@ -30,6 +30,7 @@ struct pt_shadows {
     struct pt_buffer shown;          // words of marked points, of all instances, in place of theirs
     uint32_t of_marked;              // 1: those are meant
     uint32_t next;                   // samples that they get, where these come by and by: more at each picture of one view
+    uint32_t reached;                // so many has the last picture, and wants more; 0: it has all
     uint64_t view;                   // of what picture that is
     uint32_t placed;                 // they have room, and no samples yet
     uint64_t *fingerprints;          // per instance: of whose points the words are; 0: none

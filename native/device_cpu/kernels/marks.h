@@ -5,17 +5,18 @@
 
 #include "device_cpu/vector_math.h"
 
-// Those of `lanes` whose points, from `slot` on, are shown. Slots of a vector share a word.
+// Those of `lanes` whose points, from `slot` on, are shown and have a place. Slots of a vector share a word.
 static inline vm pt_are_shown(const uint32_t *marks, uint32_t slot, vm lanes)
 {
-    return vm_and(lanes, vm_of_bits(marks[2 * (slot / PT_MARK_SLOTS)] >> slot % PT_MARK_SLOTS));
+    const uint32_t *pair = marks + 2 * (size_t)(slot / PT_MARK_SLOTS);
+    return vm_and(lanes, vm_of_bits(pair[1] ? pair[0] >> slot % PT_MARK_SLOTS : 0));
 }
 
 // Which of the shown points it is; 0, which is nobody's place: none of them.
 static inline uint32_t pt_shown_place(const uint32_t *marks, uint32_t slot)
 {
     const uint32_t *pair = marks + 2 * (size_t)(slot / PT_MARK_SLOTS), own = 1u << slot % PT_MARK_SLOTS;
-    return pair[0] & own ? pair[1] + (uint32_t)__builtin_popcount(pair[0] & (own - 1)) : 0;
+    return pair[0] & own && pair[1] ? pair[1] + (uint32_t)__builtin_popcount(pair[0] & (own - 1)) : 0;
 }
 
 // Of `lanes`, times step.

@@ -514,10 +514,10 @@ typedef struct patina_settings {
     uint32_t shadow_samples;     // of a light's area, 1..4096; 0 = 1: its middle; with shadow_error at most so many, 0 = 256
     uint32_t shadow_resolution;  // most texels on a side of a light's map; 0 = 4096. Fewer where the points lie wider
     uint32_t shadow_lazy;        // 1 = only points that the picture shows are tested, and the next frame tests anew: for
-                                 // final pictures. 0 = whole textures, kept until something that they depend on changes;
-                                 // as 1 where these would take more than a gigabyte, but by and by with shadow_progressive
+                                 // final pictures. 0 = whole textures, kept until something that they depend on changes
     uint32_t shadow_progressive; // 1 = one sample after a change, and every further render of the frame doubles them up to
-                                 // shadow_samples (stats: shadow_pending); not with shadow_lazy
+                                 // shadow_samples (stats: shadow_pending); not with shadow_lazy. Where whole textures would
+                                 // take more than a gigabyte, of points that the picture shows alone, for each view anew
     float shadow_error;          // > 0: a light's samples double until their expected error is at most this share of its
                                  // light. Expected from what the last doubling changed, root mean square over the points
                                  // in the penumbra; borders, a spacing wide, are off beyond that. Whole textures are made,
@@ -529,8 +529,8 @@ typedef struct patina_settings {
     uint32_t pixel_samples; // of a picture at rest, 1..4096; 0 = 1, with pixel_noise at most so many, 0 = 256: the colour is
                             // the mean of about so many samples a pixel, of finer pixels where that is truer, shifted
                             // pictures for the rest, each smoothed and anti-aliased as is set (truest with antialias on). Other
-                            // passes and keys are those of one sample. More than one: whole shadow textures, up to a gigabyte,
-                            // in spite of shadow_lazy, and of shadow_progressive without pixel_progressive
+                            // passes and keys are those of one sample. More than one: whole shadow textures, in spite of
+                            // shadow_lazy, and of shadow_progressive without pixel_progressive
     uint32_t depth;         // patina_depth
     uint32_t world_directed; // 1 = ambient light differs by direction: world_light, not world_color, which stays the background
     float world_light[3][9]; // with world_directed, of red, green, blue: the irradiance over pi of a surface with the normal n
