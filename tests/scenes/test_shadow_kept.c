@@ -287,34 +287,27 @@ static void test_large_textures(void **state)
     }
 }
 
-// What alone shows in a part of a picture may agree after a few samples, where the whole goes on: its pixels are the whole's all the same.
+// What shows in a part of a picture may agree after a few samples, where the whole goes on: a part does not stop.
 static void test_parts_take_all_samples(void **state)
 {
     (void)state;
-    enum { PART = 20 };
     patina_device *device = support_device_first();
     struct stage stage = stage_of(NULL, NULL);
     patina_light_desc sun = light_of(PATINA_LIGHT_SUN, 1);
-    sun.angle = 1.2f;
+    sun.angle = 1e-12f; // all agree
     CHECK(patina_scene_add_light(stage.scene, &sun), stage.scene);
-    stage.settings.shadow_samples = 16;
+    stage.settings.shadow_samples = 12;
     stage.settings.shadow_lazy = 1;
     patina_frame *frame = frame_on(device);
-    assert_int_equal(render(frame, &stage).shadow_samples, 16);
+    assert_int_equal(render(frame, &stage).shadow_maps, 4);
     struct picture whole = picture_read(frame);
-    uint32_t differ = 0;
-    for (uint32_t y = 0; y < SIZE; y += PART)
-        for (uint32_t x = 0; x < SIZE; x += PART) {
-            const uint32_t region[4] = {x, y, x + PART, y + PART};
-            memcpy(stage.settings.region, region, sizeof region);
-            render(frame, &stage);
-            struct picture part = picture_read(frame);
-            for (uint32_t row = 0; row < PART; row++)
-                differ += memcmp(part.combined + 4 * (size_t)row * PART, whole.combined + 4 * ((size_t)(y + row) * SIZE + x),
-                                 4 * PART * sizeof *part.combined) != 0;
-            picture_free(&part);
-        }
-    assert_int_equal(differ, 0);
+    const uint32_t region[4] = {0, 0, SIZE, SIZE / 2};
+    memcpy(stage.settings.region, region, sizeof region);
+    assert_int_equal(render(frame, &stage).shadow_maps, 12);
+    struct picture part = picture_read(frame);
+    for (size_t i = 0; i < 4 * SIZE * SIZE / 2; i++) // shares of 4 and of 12 samples are rounded otherwise
+        assert_true(fabsf(part.combined[i] - whole.combined[i]) < 1e-5f);
+    picture_free(&part);
     picture_free(&whole);
     patina_frame_destroy(frame);
     stage_end(&stage);
