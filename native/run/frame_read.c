@@ -2,6 +2,7 @@
 // What is read of a frame: passes, layers, keys, shadow textures, statistics, planes.
 #include "frame.h"
 
+#include "shown.h"
 #include "scene/paged.h"
 
 #include <math.h>
@@ -145,9 +146,8 @@ static uint32_t word_of(const struct words *words, uint32_t slot)
 {
     if (!words->marks)
         return words->each[slot];
-    const uint32_t *pair = words->marks + 2 * (size_t)(slot / PT_MARK_SLOTS), own = 1u << slot % PT_MARK_SLOTS;
-    const uint32_t before = (uint32_t)__builtin_popcount(pair[0] & (own - 1));
-    return pair[0] & own && pair[1] ? words->each[(size_t)words->step * (pair[1] + before) + words->first] : 0;
+    const uint32_t place = pt_shown_place(words->marks, slot);
+    return place ? words->each[(size_t)words->step * place + words->first] : 0;
 }
 
 // What arrives at the points of an instance, which of a cloud in parts is one of them.

@@ -2,6 +2,8 @@
 // Shadow textures: what is at hand, and room for what is not.
 #include "shadows.h"
 
+#include "shown.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -135,10 +137,10 @@ static int make_marks(struct patina_device *device, struct pt_shadows *shadows, 
 {
     int error = pt_flag_write(device, shadows, PT_FLAG_MARKED, 0);
     for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
-        const uint64_t groups = (scene->instances[i].cloud->slots + PT_MARK_SLOTS - 1) / PT_MARK_SLOTS;
         device->ops->buffer_destroy(device, &shadows->marks[i]);
         if (shadows->fingerprints[i])
-            error = device->ops->buffer_create(device, groups * 8, NULL, PT_ZEROED, &shadows->marks[i]);
+            error = device->ops->buffer_create(device, pt_marks_size(scene->instances[i].cloud->slots), NULL, PT_ZEROED,
+                                               &shadows->marks[i]);
     }
     return error;
 }
@@ -170,10 +172,10 @@ int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, co
                     const struct pt_plan *plan)
 {
     const int lazy = pt_plan_lazy(scene, plan);
-    const uint64_t view = pt_pixels_view(scene, plan);
     int error = PATINA_OK, changed = 0;
     if (!plan->light_count)
         return PATINA_OK;
+    const uint64_t view = pt_pixels_view(scene, plan);
     for (int i = 0; i < PT_FLAGS && !error; i++)
         if (!shadows->flags[i].size)
             error = device->ops->buffer_create(device, sizeof(uint32_t), NULL, 0, &shadows->flags[i]);

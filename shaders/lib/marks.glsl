@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Marks of points that a picture shows, and where their shadow words lie: PT_MARK_SLOTS. Include it behind the block of marks; twin of
-// native/device_cpu/kernels/marks.h
+// native/shown.h
 #ifndef PT_MARKS_GLSL
 #define PT_MARKS_GLSL
 

@@ -382,23 +382,11 @@ static void test_changed_colors(void **state)
     free(colors);
 }
 
-static void set_variable(const char *name, const char *value)
-{
-#ifdef _WIN32
-    _putenv_s(name, value ? value : "");
-#else
-    if (value)
-        setenv(name, value, 1);
-    else
-        unsetenv(name);
-#endif
-}
-
 static patina_device *open_with(const char *name, const char *variable, const char *value)
 {
-    set_variable(variable, value);
+    support_set_variable(variable, value);
     patina_device *device = open_device(name, 0, 0);
-    set_variable(variable, NULL);
+    support_set_variable(variable, NULL);
     return device;
 }
 

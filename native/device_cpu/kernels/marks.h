@@ -1,22 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Marks of points that a picture shows, and where their shadow words lie: PT_MARK_SLOTS. Twin of shaders/lib/marks.glsl.
+// Marks of points that a picture shows, several at once, and setting them.
 #ifndef PT_MARKS_H
 #define PT_MARKS_H
 
 #include "device_cpu/vector_math.h"
+#include "shown.h"
 
 // Those of `lanes` whose points, from `slot` on, are shown and have a place. Slots of a vector share a word.
 static inline vm pt_are_shown(const uint32_t *marks, uint32_t slot, vm lanes)
 {
     const uint32_t *pair = marks + 2 * (size_t)(slot / PT_MARK_SLOTS);
     return vm_and(lanes, vm_of_bits(pair[1] ? pair[0] >> slot % PT_MARK_SLOTS : 0));
-}
-
-// Which of the shown points it is; 0, which is nobody's place: none of them.
-static inline uint32_t pt_shown_place(const uint32_t *marks, uint32_t slot)
-{
-    const uint32_t *pair = marks + 2 * (size_t)(slot / PT_MARK_SLOTS), own = 1u << slot % PT_MARK_SLOTS;
-    return pair[0] & own && pair[1] ? pair[1] + (uint32_t)__builtin_popcount(pair[0] & (own - 1)) : 0;
 }
 
 // Of `lanes`, times step.
