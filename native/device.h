@@ -158,6 +158,7 @@ struct patina_device {
     struct pt_handle handle;
     const struct pt_device_ops *ops;
     patina_device_info info;
+    struct pt_pool *pool;    // its threads, which make plans too; NULL: it has none
     uint32_t bin_threads;    // that fill bins of discs; 0: its kernels do without, and planes of such bins have no memory
     uint64_t memory_cap;     // bytes of planes a frame may hold; 0: no limit
     uint64_t mapped_cap;     // bytes that a picture holds of clouds in mapped files; 0: as run/pager.h chooses

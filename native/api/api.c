@@ -343,7 +343,7 @@ size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, ch
     if (!frame || !scene)
         return 0;
     enter_clouds(scene, 1);
-    if (pt_plan_create(scene, &plan)) {
+    if (pt_plan_create(scene, NULL, &plan)) { // a picture may be drawn by the device's threads meanwhile
         leave_clouds(scene);
         return 0;
     }

@@ -2,6 +2,7 @@
 #include "arena.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 enum { BLOCK_SIZE = 64 << 10 };
 
@@ -26,6 +27,16 @@ void *pt_arena_take(struct pt_arena **arena, size_t size)
     }
     void *memory = block->memory + block->used;
     block->used += size;
+    return memory;
+}
+
+void *pt_arena_grow(struct pt_arena **arena, void *list, uint32_t *room, size_t each)
+{
+    const uint32_t grown = *room ? 2 * *room : 32;
+    void *memory = pt_arena_take(arena, grown * each);
+    if (memory && list)
+        memcpy(memory, list, *room * each);
+    *room = memory ? grown : *room;
     return memory;
 }
 

@@ -11,7 +11,6 @@
 struct cpu_device {
     struct patina_device base;
     const struct pt_cpu_isa *isa;
-    struct pt_pool *pool;
     struct pt_cpu_scratch scratch[PT_CPU_SCRATCHES];
 };
 
@@ -96,7 +95,7 @@ static int cpu_buffer_fill(struct patina_device *device, struct pt_buffer *buffe
         pattern = (pattern & 0xFFFFFFFFu) | pattern << 32;
     char *data = (char *)buffer->data + offset;
     struct fill_job job = {(uint64_t *)(void *)data, pattern, size / 8};
-    pt_parallel(cpu->pool, (uint32_t)((job.count + FILL_BLOCK - 1) / FILL_BLOCK), 4, fill_words, &job);
+    pt_parallel(cpu->base.pool, (uint32_t)((job.count + FILL_BLOCK - 1) / FILL_BLOCK), 4, fill_words, &job);
     if (size % 8)
         memcpy(data + size / 8 * 8, &pattern, size % 8);
     return PATINA_OK;
@@ -111,7 +110,7 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
     const struct pt_cpu_call call = {.arguments = arguments,
                                      .buffers = buffers,
                                      .buffer_count = buffer_count,
-                                     .pool = cpu->pool,
+                                     .pool = cpu->base.pool,
                                      .cancel = cancel,
                                      .scratch = cpu->scratch};
     (void)argument_size;
@@ -132,7 +131,7 @@ static int cpu_run_tail(struct patina_device *device, const struct pt_bound_pass
                                         {.arguments = passes[i].arguments,
                                          .buffers = passes[i].buffers,
                                          .buffer_count = passes[i].buffer_count,
-                                         .pool = cpu->pool,
+                                         .pool = cpu->base.pool,
                                          .scratch = cpu->scratch}};
     if (!error)
         error = cpu->isa->tail(bound, count);
@@ -150,7 +149,7 @@ static int cpu_wait(struct patina_device *device)
 
 static void cpu_watch(struct patina_device *device, void (*look)(void *context), void *context)
 {
-    pt_pool_watch(((struct cpu_device *)device)->pool, look, context);
+    pt_pool_watch(device->pool, look, context);
 }
 
 static void cpu_destroy(struct patina_device *device)
@@ -158,7 +157,7 @@ static void cpu_destroy(struct patina_device *device)
     struct cpu_device *cpu = (struct cpu_device *)device;
     for (int i = 0; i < PT_CPU_SCRATCHES; i++)
         pt_pages_free(cpu->scratch[i].memory, cpu->scratch[i].size);
-    pt_pool_destroy(cpu->pool);
+    pt_pool_destroy(cpu->base.pool);
     pt_handle_destroy(&device->handle);
     free(cpu);
 }
@@ -197,7 +196,7 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *isa, struct
     pt_handle_init(&cpu->base.handle);
     cpu->base.ops = &cpu_ops;
     cpu->isa = isas[chosen];
-    cpu->pool = pool;
+    cpu->base.pool = pool;
     cpu->base.memory_cap = desc->memory_cap;
     cpu->base.bin_threads = pt_pool_threads(pool);
     cpu->base.info = (patina_device_info){.struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool)};

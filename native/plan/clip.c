@@ -13,17 +13,11 @@
 // Room for `more` clips behind those there are; NULL without memory.
 static struct clip_view *more_clips(struct pt_plan *plan, uint32_t more)
 {
-    uint32_t room = plan->clip_room ? plan->clip_room : 64;
-    while (room < plan->clip_count + more)
-        room *= 2;
-    if (room > plan->clip_room) {
-        struct clip_view *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
+    while (plan->clip_room < plan->clip_count + more) {
+        struct clip_view *grown = pt_arena_grow(&plan->arena, plan->clips, &plan->clip_room, sizeof *grown);
         if (!grown)
             return NULL;
-        if (plan->clip_count)
-            memcpy(grown, plan->clips, plan->clip_count * sizeof *grown);
         plan->clips = grown;
-        plan->clip_room = room;
     }
     return plan->clips + plan->clip_count;
 }

@@ -476,7 +476,7 @@ static int some_mesh_receives(const struct patina_scene *scene)
 }
 
 // How wide a texel is, from the casters' spacing as a survey with square texels sees it.
-static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *planned)
+static int choose_texel(const struct patina_scene *scene, struct pt_pool *pool, struct pt_plan_light *planned)
 {
     double axes[9], position[3], spacing = 0.0, widest_window = 0.0;
     int parallel = planned->light->type == PATINA_LIGHT_SUN;
@@ -487,7 +487,7 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
                                       .clips = scene->clips,
                                       .clip_count = as_cut(scene).clip_count,
                                       .has_camera = 1};
-        struct pt_plan plan = {.ids.filled = 1}; // as maps are, whatever the clouds are drawn as
+        struct pt_plan plan = {.pool = pool, .ids.filled = 1}; // as maps are, whatever the clouds are drawn as
         if (planned->cube)
             face_axes(face, axes);
         struct extent extent = look(scene, NULL, axes, position);
@@ -530,7 +530,7 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
 int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i)
 {
     aim(scene, &plan->lights[i]);
-    return choose_texel(scene, &plan->lights[i]);
+    return choose_texel(scene, plan->pool, &plan->lights[i]);
 }
 
 int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i)

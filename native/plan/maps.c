@@ -265,7 +265,7 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
     const struct pt_shadow_group *group = &picture->groups[round->group];
     struct patina_scene view = {0};
     double window[4];
-    *map = (struct pt_plan){.map = 1};
+    *map = (struct pt_plan){.map = 1, .pool = picture->pool};
     struct tests tests = begin_tests(scene, picture, round, map);
     tests.view = &view;
     tests.group = group;
@@ -316,7 +316,7 @@ int pt_plan_close(const struct patina_scene *scene, const struct pt_plan *pictur
                                            .top = 1,
                                            .far_clip = 1};
     const struct patina_scene nothing = {.camera = anywhere, .settings = {.width = 1, .height = 1}}; // lies in no window
-    *map = (struct pt_plan){.map = 1};
+    *map = (struct pt_plan){.map = 1, .pool = picture->pool};
     struct tests tests = begin_tests(scene, picture, round, map);
     tests.view = &nothing;
     tests.args.close = 1;

@@ -19,16 +19,12 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
 {
     struct pt_plan *plan = builder->plan;
     if (plan->pass_count == builder->room) {
-        uint32_t room = builder->room ? 2 * builder->room : 32;
-        struct pt_pass *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
+        struct pt_pass *grown = pt_arena_grow(&plan->arena, plan->passes, &builder->room, sizeof *grown);
         if (!grown) {
             builder->failed = PATINA_ERROR_MEMORY;
             return &builder->nowhere;
         }
-        if (plan->pass_count)
-            memcpy(grown, plan->passes, plan->pass_count * sizeof *grown);
         plan->passes = grown;
-        builder->room = room;
     }
     const int wrong = pt_check_bindings(kernel, arguments, refs, ref_count);
     builder->failed = wrong ? wrong : builder->failed;

@@ -602,10 +602,10 @@ int pt_plan_textures(const struct patina_scene *scene, struct pt_plan *plan)
     return builder.failed;
 }
 
-int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
+int pt_plan_create(const struct patina_scene *scene, struct pt_pool *pool, struct pt_plan *plan)
 {
     struct pt_builder builder = {.scene = scene, .plan = plan};
-    *plan = (struct pt_plan){0};
+    *plan = (struct pt_plan){.pool = pool};
     if (!scene->has_camera)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
     int error = pt_plan_view(scene, plan);

@@ -330,6 +330,7 @@ struct pt_slab {
 };
 
 struct pt_plan {
+    struct pt_pool *pool;     // that it is made by; NULL: by the calling thread alone
     struct view_args view;    // level 0; rect: union over instances and meshes
     uint32_t levels;          // coarse levels
     uint32_t crop[4];         // x, y, width, height of the picture in the planes
@@ -423,8 +424,9 @@ static inline int pt_plan_draws(const struct pt_plan *plan, enum pt_kind kind)
 // Is there anything in view that is no soft point?
 static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->mesh.triangles; }
 
-// Every pointer inside belongs to the plan; the clouds must outlive it. Message on the scene when it fails.
-int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan);
+// Every pointer inside belongs to the plan, but for the pool's (NULL: the calling thread makes it alone), whose threads change nothing of it;
+// the clouds must outlive it. Message on the scene when it fails.
+int pt_plan_create(const struct patina_scene *scene, struct pt_pool *pool, struct pt_plan *plan);
 void pt_plan_destroy(struct pt_plan *plan);
 
 // Width and height of a plane at a level (of planes with levels) or of a layer.

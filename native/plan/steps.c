@@ -7,16 +7,12 @@ struct pt_step *pt_add_step(struct pt_builder *builder, enum pt_step_of of)
 {
     struct pt_plan *plan = builder->plan;
     if (plan->step_count == builder->step_room) {
-        const uint32_t room = builder->step_room ? 2 * builder->step_room : 16;
-        struct pt_step *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
+        struct pt_step *grown = pt_arena_grow(&plan->arena, plan->steps, &builder->step_room, sizeof *grown);
         if (!grown) {
             builder->failed = PATINA_ERROR_MEMORY;
             return &builder->no_step;
         }
-        if (plan->step_count)
-            memcpy(grown, plan->steps, plan->step_count * sizeof *grown);
         plan->steps = grown;
-        builder->step_room = room;
     }
     struct pt_step *step = &plan->steps[plan->step_count++];
     *step = (struct pt_step){.of = of, .layer = builder->layer};

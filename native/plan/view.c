@@ -17,6 +17,7 @@
 #include "scene/clusters.h"
 #include "scene/paged.h"
 #include "base/elementary.h"
+#include "base/pool.h"
 #include "shared/discs.h"
 
 #include <math.h>
@@ -95,11 +96,25 @@ struct cells { // of an instance that is drawn as range images; count 0: it is n
     uint32_t count;
 };
 
+// Chunks of a cloud that one thread looks at; what it finds of them.
+enum { CHUNKS_AT_ONCE = 8 * PT_CLUSTER };
+
+struct looked {
+    int last;          // it is none
+    struct seen *list; // the survey's own; NULL: none is in view
+    uint32_t count;
+    uint64_t first, end; // slots of those in view
+    uint64_t clipped;
+    int points, discs; // as of a survey
+    struct pt_detail detail;
+    int error;
+};
+
 struct survey {
     struct pt_eye camera;
     struct pt_sieve *sieves; // per instance
     struct pt_object *objects;
-    struct seen **seen; // per instance
+    struct looked **looked; // per instance: its blocks, in order, and one behind them
     uint32_t *seen_count;
     int points, discs;   // some chunk's points are drawn as such
     struct cells *cells; // per instance
@@ -136,99 +151,206 @@ static double stretch_of(const struct pt_eye *camera, const struct pt_extent *ex
 // Pixels beyond the picture that are looked at: whatever the guard will be, the same is seen. It is seldom more.
 enum { AROUND = 160, FARTHEST_FACE = 96 };
 
+struct look {
+    const struct patina_scene *scene;
+    const struct pt_plan *plan;
+    const struct survey *survey;
+    const struct pt_instance *instance;
+    struct pt_looking looking; // but for the detail, of which each has its own
+    int cull, layered;
+    uint32_t of; // the instance's number
+};
+
+// Whether it is in view; what of it is clipped is counted.
+static int look_at_chunk(const struct look *look, struct looked *block, const struct pt_chunk *chunk, struct seen *seen)
+{
+    const struct pt_eye *camera = look->looking.camera;
+    const struct pt_object *object = &look->survey->objects[look->of];
+    const int ranges = look->looking.kind == PT_AS_RANGES, discs = look->looking.kind == PT_AS_DISCS;
+    double translation[3], eye[4], angle = 0.0, spread = 0.0;
+    if (pt_sieve_chunk(look->looking.sieve, chunk, NULL, NULL) == PT_CUT_AWAY) {
+        block->clipped++;
+        return 0;
+    }
+    pt_chunk_eye(object, chunk, eye);
+    int known = !object->singular && chunk_angles(chunk, eye, &angle, &spread);
+    enum facing facing = chunk_facing(known, angle, spread);
+    if (look->cull && facing == FACES_AWAY)
+        return 0;
+    pt_chunk_translation(camera, object, chunk, translation);
+    if (!pt_kind_bounds(camera, look->looking.kind, look->looking.what, chunk, look->looking.rows, translation, &seen->extent))
+        return 0;
+    const double pixel = pt_most(camera->xs, camera->ys), middle = seen->extent.z_middle;
+    const double before = camera->orthographic ? 1.0 : pt_most(seen->extent.z_before, 0.0);
+    double left_out, rim;
+    if (!pt_detail_draws(&block->detail, chunk, pixel * before / object->scale, &left_out))
+        return 0;
+    pt_paged_look(look->instance->cloud, seen->chunk);
+    const double stretch = stretch_of(camera, &seen->extent, &rim);
+    for (int k = 0; k < 4; k++)
+        seen->extent.rect[k] -= AROUND;
+    seen->cull = look->cull && facing == FACES_BOTH;
+    seen->away = facing == FACES_AWAY && !look->layered && !ranges;
+    double footprint = pixel * (camera->orthographic ? 1.0 : middle);
+    // a lamp sees a plate before a floor in one chunk: light leaks where the nearer of both has holes
+    double nearest = look->plan->map && !camera->orthographic
+                         ? pixel * pt_most(2.0 * middle - seen->extent.z_beyond, 0.5 * middle)
+                         : footprint;
+    uint32_t count = pt_drawn_points(look->scene, chunk);
+    double thinned = left_out * sqrt((double)chunk->count / count);
+    // range images need no analysis, so that none may change them: nor may the normals that it finds
+    seen->spacing_px = ranges ? thinned * (double)chunk->built * object->scale / nearest
+                              : thinned * (double)chunk->spacing * object->scale / nearest *
+                                    sqrt(chunk_cosine(known, angle, spread));
+    // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
+    seen->area_px = pt_least(seen->extent.share * count * seen->spacing_px * seen->spacing_px, camera->width * camera->height);
+    const double reach = discs ? pt_usual_disc(look->looking.what, chunk) * stretch : 0.0;
+    const double finer = pt_finer(look->scene); // samples show the same surface
+    seen->wide = ranges || look->scene->settings.surface == PATINA_SURFACE_SPLATS ||
+                 reach > WIDE_FOOTPRINT * finer * pixel * rim ||
+                 (reach > 0.0 && seen->spacing_px > left_out * SPARSE * finer);     // the same as of all points
+    const double across = 1.0 + (2.0 * reach / (pixel * rim) + 2.0) / PT_DISC_TILE; // few are wider than reach
+    seen->tiles = pt_least(across * across, PT_DISC_LARGE);
+    return 1;
+}
+
+static void look_at_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct look *look = context;
+    const struct patina_cloud *cloud = look->instance->cloud;
+    const struct pt_cluster *clusters = pt_sieves(look->looking.sieve) ? NULL : cloud->clusters; // what clips take is counted
+    (void)thread;
+    for (uint32_t i = begin; i < end; i++) {
+        struct looked *block = &look->survey->looked[look->of][i];
+        struct pt_looking looking = look->looking;
+        looking.detail = &block->detail;
+        const uint64_t last = (uint64_t)(i + 1) * CHUNKS_AT_ONCE;
+        const uint32_t stop = last < cloud->chunk_count ? (uint32_t)last : cloud->chunk_count;
+        for (uint32_t c = i * CHUNKS_AT_ONCE; (c = pt_chunk_from(cloud, c)) < stop; c++) {
+            const struct pt_cluster *cluster = clusters && c % PT_CLUSTER == 0 ? &clusters[c / PT_CLUSTER] : NULL;
+            struct seen seen = {.chunk = c};
+            if (cluster && cluster->known && pt_is_out(&looking, &cluster->around)) {
+                c += PT_CLUSTER - 1;
+                continue;
+            }
+            if (!look_at_chunk(look, block, &cloud->chunks[c], &seen))
+                continue;
+            if (!block->list && !(block->list = malloc((stop - c) * sizeof seen))) {
+                block->error = PATINA_ERROR_MEMORY;
+                break;
+            }
+            const uint64_t first = cloud->chunks[c].first, after = first + cloud->chunks[c].padded;
+            block->first = !block->count || first < block->first ? first : block->first;
+            block->end = after > block->end ? after : block->end;
+            block->points |= !seen.wide;
+            block->discs |= seen.wide && looking.kind != PT_AS_RANGES;
+            block->list[block->count++] = seen;
+        }
+    }
+}
+
+// Chunks in view, in their order. at: {0} at first. NULL: there are no more.
+struct place {
+    uint32_t block, seen;
+};
+
+static const struct seen *next_seen(const struct survey *survey, uint32_t i, struct place *at)
+{
+    const struct looked *block = &survey->looked[i][at->block];
+    while (block->last ? 0 : at->seen == block->count) {
+        *at = (struct place){at->block + 1, 0};
+        block++;
+    }
+    return block->last ? NULL : &block->list[at->seen++];
+}
+
+static void survey_free(struct survey *survey, uint32_t instances)
+{
+    for (uint32_t i = 0; i < instances && survey->looked; i++)
+        for (struct looked *block = survey->looked[i]; block && !block->last; block++)
+            free(block->list);
+}
+
 static int look_at_instance(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey, uint32_t i)
 {
     const struct pt_instance *instance = &scene->instances[i];
     const struct patina_cloud *cloud = instance->cloud;
     const struct pt_eye *camera = &survey->camera;
     struct pt_object *object = &survey->objects[i];
-    int transparent = is_transparent(instance), layered = transparent || scene->settings.layer_passes;
+    int transparent = is_transparent(instance);
     pt_object_of(camera, instance->style.world_from_object, object);
-    int cull = instance->style.cull_back && cloud->info.normals_oriented && !object->singular && !transparent;
-    struct seen *list = pt_arena_take(&plan->arena, (pt_chunks_there(cloud) + 1) * sizeof *list);
     struct pt_inverse_clip *clips = pt_arena_take(&plan->arena, (scene->clip_count + 1) * sizeof *clips);
-    if (!list || !clips)
+    const uint32_t chunks = instance->style.transparency < 1.0f && !pt_all_soft(instance) ? cloud->chunk_count : 0;
+    const uint32_t count = chunks / CHUNKS_AT_ONCE + (chunks % CHUNKS_AT_ONCE > 0);
+    struct looked *blocks = survey->looked[i] = pt_arena_take(&plan->arena, (count + 1) * sizeof *blocks);
+    if (blocks)
+        blocks[count].last = 1;
+    if (!clips || !blocks)
         return PATINA_ERROR_MEMORY;
-    survey->seen[i] = list;
     survey->sieves[i] = pt_sieve_make(scene, instance, PT_SOLID_POINTS, clips);
-    const int ranges = pt_draws_ranges(scene, plan, instance), discs = pt_knows_discs(scene, plan, instance);
-    const enum pt_kind kind = ranges ? PT_AS_RANGES : discs ? PT_AS_DISCS : PT_AS_POINTS; // that reaches farthest
     const struct pt_to_place what = {scene, instance, object};
-    struct pt_detail *detail = &survey->details[i];
-    pt_detail_begin(scene, plan, instance, detail);
-    const double wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
     double rows[9];
     pt_object_rows(camera, object, rows);
-    const struct pt_cluster *clusters = pt_sieves(&survey->sieves[i]) ? NULL : cloud->clusters; // what clips take is counted
-    const struct pt_looking looking = {camera, kind, &what, rows, &survey->sieves[i], detail};
-    const uint32_t end = instance->style.transparency < 1.0f && !pt_all_soft(instance) ? cloud->chunk_count : 0;
-    plan->chunks_clipped += end ? pt_plan_absent(&looking) : 0;
-    for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < end; c++) {
-        const struct pt_cluster *cluster = clusters && c % PT_CLUSTER == 0 ? &clusters[c / PT_CLUSTER] : NULL;
-        if (cluster && cluster->known && pt_is_out(&looking, &cluster->around)) {
-            c += PT_CLUSTER - 1;
-            continue;
-        }
-        const struct pt_chunk *chunk = &cloud->chunks[c];
-        struct seen seen = {.chunk = c};
-        double translation[3], eye[4], angle = 0.0, spread = 0.0;
-        if (pt_sieve_chunk(&survey->sieves[i], chunk, NULL, NULL) == PT_CUT_AWAY) {
-            plan->chunks_clipped++;
-            continue;
-        }
-        pt_chunk_eye(object, chunk, eye);
-        int known = !object->singular && chunk_angles(chunk, eye, &angle, &spread);
-        enum facing facing = chunk_facing(known, angle, spread);
-        if (cull && facing == FACES_AWAY)
-            continue;
-        pt_chunk_translation(camera, object, chunk, translation);
-        if (!pt_kind_bounds(camera, kind, &what, chunk, rows, translation, &seen.extent))
-            continue;
-        const double pixel = pt_most(camera->xs, camera->ys), middle = seen.extent.z_middle;
-        const double before = camera->orthographic ? 1.0 : pt_most(seen.extent.z_before, 0.0);
-        double left_out, rim;
-        if (!pt_detail_draws(detail, chunk, pixel * before / object->scale, &left_out))
-            continue;
-        pt_paged_look(cloud, c);
-        const double stretch = stretch_of(camera, &seen.extent, &rim);
-        for (int k = 0; k < 4; k++)
-            seen.extent.rect[k] -= AROUND;
-        seen.cull = cull && facing == FACES_BOTH;
-        seen.away = facing == FACES_AWAY && !layered && !ranges;
-        double footprint = pixel * (camera->orthographic ? 1.0 : middle);
-        // a lamp sees a plate before a floor in one chunk: light leaks where the nearer of both has holes
-        double nearest = plan->map && !camera->orthographic ? pixel * pt_most(2.0 * middle - seen.extent.z_beyond, 0.5 * middle)
-                                                            : footprint;
-        uint32_t count = pt_drawn_points(scene, chunk);
-        double thinned = left_out * sqrt((double)chunk->count / count);
-        // range images need no analysis, so that none may change them: nor may the normals that it finds
-        seen.spacing_px = ranges ? thinned * (double)chunk->built * object->scale / nearest
-                                 : thinned * (double)chunk->spacing * object->scale / nearest *
-                                       sqrt(chunk_cosine(known, angle, spread));
-        // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
-        seen.area_px = pt_least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
-        const double reach = discs ? pt_usual_disc(&what, chunk) * stretch : 0.0;
-        seen.wide = ranges || scene->settings.surface == PATINA_SURFACE_SPLATS || reach > wide * pixel * rim ||
-                    (reach > 0.0 && seen.spacing_px > left_out * SPARSE * pt_finer(scene)); // the same as of all points
-        const double across = 1.0 + (2.0 * reach / (pixel * rim) + 2.0) / PT_DISC_TILE;     // few are wider than reach
-        seen.tiles = pt_least(across * across, PT_DISC_LARGE);
-        survey->points |= !seen.wide;
-        survey->discs |= seen.wide && !ranges;
-        list[survey->seen_count[i]++] = seen;
+    pt_detail_begin(scene, plan, instance, &survey->details[i]);
+    struct look look = {.scene = scene,
+                        .plan = plan,
+                        .survey = survey,
+                        .instance = instance,
+                        .looking = {camera,
+                                    pt_draws_ranges(scene, plan, instance)  ? PT_AS_RANGES
+                                    : pt_knows_discs(scene, plan, instance) ? PT_AS_DISCS
+                                                                            : PT_AS_POINTS, // that reaches farthest
+                                    &what, rows, &survey->sieves[i], &survey->details[i]},
+                        .cull = instance->style.cull_back && cloud->info.normals_oriented && !object->singular && !transparent,
+                        .layered = transparent || scene->settings.layer_passes,
+                        .of = i};
+    plan->chunks_clipped += chunks ? pt_plan_absent(&look.looking) : 0;
+    for (uint32_t k = 0; k < count; k++)
+        blocks[k].detail = survey->details[i];
+    pt_parallel(count > 1 ? plan->pool : NULL, count, 1, look_at_chunks, &look);
+    int error = PATINA_OK;
+    for (const struct looked *block = blocks; !block->last; block++) {
+        error = block->error ? block->error : error;
+        survey->seen_count[i] += block->count;
+        survey->points |= block->points;
+        survey->discs |= block->discs;
+        plan->chunks_clipped += block->clipped;
+        pt_detail_join(&survey->details[i], &block->detail);
     }
     plan->transparent |= transparent && survey->seen_count[i] > 0;
-    return PATINA_OK;
+    return error;
 }
 
 struct weighted {
     double value, weight;
 };
 
-static int compare_weighted(const void *a, const void *b)
+static uint64_t double_bits(double value)
 {
-    const struct weighted *x = a, *y = b; // sums depend on the order, and C libraries leave that of equals open
-    return x->value != y->value ? (x->value > y->value) - (x->value < y->value)
-                                : (x->weight > y->weight) - (x->weight < y->weight);
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS };
+
+// By values, which are not below 0, so that their bits are in their order; equals stay as they lie, for sums depend on the order. Of tens of
+// thousands of chunks in view a comparing sort takes a fourth of the plan. spare: as long as the list. The sorted one of both.
+static struct weighted *sort_weighted(struct weighted *list, struct weighted *spare, uint32_t count)
+{
+    for (uint32_t shift = 0; shift < 64; shift += DIGIT_BITS) {
+        uint32_t starts[DIGITS + 1] = {0};
+        for (uint32_t k = 0; k < count; k++)
+            starts[1 + (double_bits(list[k].value) >> shift & (DIGITS - 1))]++;
+        for (uint32_t digit = 0; digit < DIGITS; digit++)
+            starts[digit + 1] += starts[digit];
+        for (uint32_t k = 0; k < count; k++)
+            spare[starts[double_bits(list[k].value) >> shift & (DIGITS - 1)]++] = list[k];
+        struct weighted *const sorted = spare;
+        spare = list;
+        list = sorted;
+    }
+    return list;
 }
 
 // Spacings of the chunks of instances [first, end) with the area that they cover; those that face away only when asked for.
@@ -236,9 +358,9 @@ static uint32_t weigh_chunks(const struct survey *survey, uint32_t first, uint32
                              double *area)
 {
     uint32_t count = 0;
+    const struct seen *seen;
     for (uint32_t i = first; i < end; i++)
-        for (uint32_t c = 0; c < survey->seen_count[i]; c++) {
-            const struct seen *seen = &survey->seen[i][c];
+        for (struct place at = {0}; (seen = next_seen(survey, i, &at));) {
             if (!(seen->area_px > 0.0) || !isfinite(seen->area_px) || (seen->away && !away))
                 continue;
             list[count++] = (struct weighted){seen->spacing_px, seen->area_px};
@@ -255,12 +377,12 @@ static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32
     double area = 0.0, sum = 0.0;
     for (uint32_t i = first; i < end; i++)
         total += survey->seen_count[i];
-    struct weighted *list = malloc((total + 1) * sizeof *list);
-    if (!list)
+    struct weighted *const room = malloc((2 * (size_t)total + 1) * sizeof *room);
+    if (!room)
         return PATINA_ERROR_MEMORY;
     for (int away = 0; away < 2 && !count; away++)
-        count = weigh_chunks(survey, first, end, away, list, &area);
-    qsort(list, count, sizeof *list, compare_weighted);
+        count = weigh_chunks(survey, first, end, away, room, &area);
+    const struct weighted *list = sort_weighted(room, room + total, count);
     for (uint32_t k = 0; k < count && sum <= 0.95 * area; k++) {
         if (sum <= 0.01 * area)
             out->least = list[k].value;
@@ -269,7 +391,7 @@ static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32
         sum += list[k].weight;
         out->most = list[k].value;
     }
-    free(list);
+    free(room);
     return PATINA_OK;
 }
 
@@ -354,14 +476,17 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         out->as.range = range;
     pt_set_instance(&survey->camera, &survey->objects[i], instance, thinned, &out->args);
     pt_set_ids(plan, i, discs, &out->args);
-    out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
-    out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
+    const struct seen *seen;
+    uint32_t room = 1;
+    for (struct place at = {0}; (seen = next_seen(survey, i, &at));)
+        room += seen->wide == (kind != PT_AS_POINTS);
+    out->chunks = pt_arena_take(&plan->arena, room * sizeof *out->chunks);
+    out->bounds = pt_arena_take(&plan->arena, room * sizeof *out->bounds);
     if (!out->chunks || !out->bounds)
         return PATINA_ERROR_MEMORY;
     double rows[9];
     pt_object_rows(eye, &survey->objects[i], rows);
-    for (uint32_t k = 0; k < survey->seen_count[i]; k++) {
-        const struct seen *seen = &survey->seen[i][k];
+    for (struct place at = {0}; (seen = next_seen(survey, i, &at));) {
         const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
         const double *bounds = seen->extent.rect,
                      around[4] = {bounds[0] - faces, bounds[1] - faces, bounds[2] + faces, bounds[3] + faces};
@@ -420,15 +545,15 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
 {
     const struct patina_cloud *cloud = scene->instances[i].cloud;
     const uint32_t all = scene->settings.surface == PATINA_SURFACE_SPLATS;
-    uint32_t wide = 0;
+    int wide = 0;
     plan->chunks += cloud->chunk_count;
     plan->chunks_culled += cloud->chunk_count;
     plan->points += pt_is_first_part(scene, i) ? cloud->info.count : 0;
     if (survey->cells[i].count)
         return place_range(scene, plan, survey, i);
     int error = place_chunks(scene, plan, survey, i, all ? PT_AS_DISCS : PT_AS_POINTS, 0, NULL, &plan->instances[i]);
-    for (uint32_t k = 0; k < survey->seen_count[i] && !all; k++)
-        wide |= survey->seen[i][k].wide;
+    for (const struct looked *block = survey->looked[i]; !block->last && !all; block++)
+        wide |= block->discs;
     if (!error && wide)
         error = place_chunks(scene, plan, survey, i, PT_AS_DISCS, plan->discs.first, NULL,
                              &plan->instances[plan->instance_count++]);
@@ -499,12 +624,12 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
 {
     plan->instance_count = scene->cloud_count;
     survey->objects = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->objects);
-    survey->seen = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->seen);
+    survey->looked = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->looked);
     survey->seen_count = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->seen_count);
     survey->sieves = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->sieves);
     survey->thinned = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->thinned);
     survey->details = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *survey->details);
-    if (!survey->details || !survey->thinned || !survey->sieves || !survey->objects || !survey->seen || !survey->seen_count)
+    if (!survey->details || !survey->thinned || !survey->sieves || !survey->objects || !survey->looked || !survey->seen_count)
         return PATINA_ERROR_MEMORY;
     int error = pt_eye_of(scene, &survey->camera);
     const struct pt_eye bare = survey->camera;
@@ -526,15 +651,14 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
 }
 
 // From the first to the last of the slots that are seen.
-static struct pt_window window_of(const struct patina_cloud *cloud, const struct seen *seen, uint32_t count)
+static struct pt_window window_of(const struct looked *block)
 {
-    uint64_t first = cloud->slots, end = 0;
-    for (uint32_t k = 0; k < count; k++) {
-        const struct pt_chunk *chunk = &cloud->chunks[seen[k].chunk];
-        first = chunk->first < first ? chunk->first : first;
-        end = (uint64_t)chunk->first + chunk->padded > end ? (uint64_t)chunk->first + chunk->padded : end;
+    uint64_t first = UINT64_MAX, end = 0;
+    for (; !block->last; block++) {
+        first = block->count && block->first < first ? block->first : first;
+        end = block->end > end ? block->end : end;
     }
-    return count ? (struct pt_window){.first = (uint32_t)first, .count = (uint32_t)(end - first)} : (struct pt_window){0};
+    return end ? (struct pt_window){.first = (uint32_t)first, .count = (uint32_t)(end - first)} : (struct pt_window){0};
 }
 
 // Ids of what the whole picture sees: a region's are the same.
@@ -543,7 +667,7 @@ static int number_seen(const struct patina_scene *scene, struct pt_plan *plan, s
     plan->ids.windows = pt_arena_take(&plan->arena, (scene->cloud_count + 1) * sizeof *plan->ids.windows);
     int error = plan->ids.windows ? look_around(scene, plan, survey) : PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
-        plan->ids.windows[i] = window_of(scene->instances[i].cloud, survey->seen[i], survey->seen_count[i]);
+        plan->ids.windows[i] = window_of(survey->looked[i]);
     return error;
 }
 
@@ -560,6 +684,7 @@ static int look_and_number(const struct patina_scene *scene, struct pt_plan *pla
     *plan = before;
     plan->arena = arena;
     plan->ids.filled = 1;
+    survey_free(survey, scene->cloud_count);
     *survey = (struct survey){0};
     error = number_seen(scene, plan, survey);
     return error || pt_plan_number(scene, plan) ? error : pt_plan_too_many(scene, plan);
@@ -568,24 +693,25 @@ static int look_and_number(const struct patina_scene *scene, struct pt_plan *pla
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = {0};
-    return look_around(scene, plan, &survey);
+    const int error = look_around(scene, plan, &survey);
+    survey_free(&survey, scene->cloud_count);
+    return error;
 }
 
-int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
+static int plan_view(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
 {
-    struct survey survey = {0};
     plan->instances = pt_arena_take(&plan->arena, (2 * (size_t)scene->cloud_count + 1) * sizeof *plan->instances);
     plan->mesh.count = scene->mesh_count;
     plan->mesh.list = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->mesh.list);
     if (!plan->instances || !plan->mesh.list)
         return PATINA_ERROR_MEMORY;
     // 1. Spacings, and ids.
-    int error = look_and_number(scene, plan, &survey);
-    if (error || (error = choose_cells(scene, plan, &survey)))
+    int error = look_and_number(scene, plan, survey);
+    if (error || (error = choose_cells(scene, plan, survey)))
         return error;
     plan->discs.first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : plan->ids.discs;
-    plan->discs.count = survey.discs ? (uint32_t)plan->ids.points : 0;
-    plan->filled = survey.points;
+    plan->discs.count = survey->discs ? (uint32_t)plan->ids.points : 0;
+    plan->filled = survey->points;
     plan->reaches = plan->discs.count &&
                     pt_knows_reach(scene, plan); // asking takes a tenth of the frame: not where all points lie close
     plan->sigmas = pt_knows_sigmas(scene);
@@ -602,18 +728,26 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     uint32_t guard = pt_round_up(8 + 4 * cell + pt_line_reach(plan) + reach, cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
-    pt_pad_eye(&survey.camera, guard);
-    set_view(&survey.camera, &plan->view);
+    pt_pad_eye(&survey->camera, guard);
+    set_view(&survey->camera, &plan->view);
     pt_choose_window(scene, plan, guard);
     if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "planes of %u x %u pixels are too large: render in regions",
                        plan->view.width, plan->view.height);
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
-        error = place_instance(scene, plan, &survey, i);
+        error = place_instance(scene, plan, survey, i);
     for (uint32_t i = 0; i < scene->mesh_count && !error; i++)
-        place_mesh(plan, &survey.camera, pt_mesh_at(scene, i), (uint32_t)plan->ids.points + pt_mesh_at(scene, i)->id_base,
+        place_mesh(plan, &survey->camera, pt_mesh_at(scene, i), (uint32_t)plan->ids.points + pt_mesh_at(scene, i)->id_base,
                    &plan->mesh.list[i]);
-    return error || (plan->map && !plan->soft.veils) ? error : pt_place_soft(scene, plan, &survey.camera);
+    return error || (plan->map && !plan->soft.veils) ? error : pt_place_soft(scene, plan, &survey->camera);
+}
+
+int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
+{
+    struct survey survey = {0};
+    const int error = plan_view(scene, plan, &survey);
+    survey_free(&survey, scene->cloud_count);
+    return error;
 }
 
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,

@@ -141,7 +141,7 @@ static int draw_once(struct patina_frame *frame, const struct patina_scene *scen
     (void)of;
     struct pt_plan plan;
     const double start = pt_milliseconds();
-    int error = pt_plan_create(scene, &plan);
+    int error = pt_plan_create(scene, frame->device->pool, &plan);
     if (!error && (error = pt_frame_number(frame, scene, &plan)))
         pt_plan_destroy(&plan);
     if (!error && frame->merge && (error = pt_merge_begin(frame->merge, scene, &plan)))

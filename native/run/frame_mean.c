@@ -272,7 +272,7 @@ static int begin(struct patina_frame *frame, const struct patina_scene *scene)
 {
     struct pt_plan plan;
     struct patina_scene plain = *scene; // its handle is not touched
-    int error = pt_plan_create(&plain, &plan);
+    int error = pt_plan_create(&plain, frame->device->pool, &plan);
     if (error)
         return pt_fail_again(&frame->handle, error);
     const struct pt_sampling sampling = pt_choose_sampling(scene, &plan);

@@ -228,7 +228,7 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
     struct pt_keys_head head;
     frame->times.count = 0;
     frame->pager = (struct pt_pager){.cancel = &frame->cancel};
-    int error = pt_plan_create(scene, &job.plan);
+    int error = pt_plan_create(scene, frame->device->pool, &job.plan);
     if (error)
         return error;
     pt_plan_set_bins(&job.plan, frame->device->bin_threads, 0);

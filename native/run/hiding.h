@@ -7,15 +7,22 @@
 #include "hidden.h"
 #include "plan/rounds.h"
 
-struct pt_hiding {
-    struct pt_chunk_list *lists, *rounds[2]; // each list from near to far; what two rounds have of them, by turns
-    struct chunk_view *chunks;               // of all lists
-    uint32_t *next;                          // of each list
-    uint32_t count, depth, list, turn;       // steps nearer than this are done, and of it the lists before this one
-    struct pt_tiles tiles;                   // of keys as they are by now
+struct pt_hiding_list {
+    uint32_t *order;           // its chunks from near to far
+    struct chunk_view *chunks; // those that rounds took, one behind the other: room for all
+    uint32_t next, taken;      // of both
 };
 
-// Copies the lists and their chunks. keys: of planes so wide and high. 0: there is no memory for it.
+struct pt_hiding {
+    const struct pt_chunk_list *lists;
+    struct pt_chunk_list *rounds[2];   // what two rounds have of the lists, by turns
+    struct pt_hiding_list *of;         // each list
+    uint32_t count, depth, list, turn; // steps nearer than this are done, and of it the lists before this one
+    struct pt_tiles tiles;             // of keys as they are by now
+    void *memory;
+};
+
+// The lists and their chunks stay as they are until it ends. keys: of planes so wide and high. 0: there is no memory for it.
 int pt_hiding_begin(struct pt_hiding *hiding, const struct pt_chunk_list *lists, uint32_t count, const uint64_t *keys,
                     uint32_t width, uint32_t height);
 void pt_hiding_end(struct pt_hiding *hiding);

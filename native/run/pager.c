@@ -292,7 +292,7 @@ struct bound {
     struct pt_buffer **buffers;
     uint32_t count;
     uint64_t most;           // bytes that a range reads
-    struct pt_hiding hiding; // no lists: nothing is hidden
+    struct pt_hiding hiding; // no memory: nothing is hidden
 };
 
 struct drawn {                         // at a time
@@ -318,7 +318,7 @@ static void begin_hiding(const struct pt_pass *pass, struct pt_buffer *const *bu
 // The one after *drawn, which begins as nothing.
 static int next_range(struct bound *bound, struct drawn *drawn)
 {
-    if (!bound->hiding.lists) {
+    if (!bound->hiding.memory) {
         drawn->lists = bound->lists;
         return pt_next_range(bound->lists, bound->count, bound->most, &drawn->range);
     }
@@ -363,7 +363,7 @@ static int run_ranges(struct pt_pager *pager, const struct pt_pass *pass, struct
         some = next_range(bound, &next);
         if (some)
             expect(next.lists, bound->count, &next.range);
-        make_room(pager, bound->hiding.lists ? HIDING_HOLDS * drawn.range.bytes : drawn.range.bytes);
+        make_room(pager, bound->hiding.memory ? HIDING_HOLDS * drawn.range.bytes : drawn.range.bytes);
         error = check_range(pager, pass, bound, &drawn);
         error = error ? error : run_range(bound, whole, &drawn, run, context);
         pager->read += drawn.range.bytes;

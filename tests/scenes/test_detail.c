@@ -183,7 +183,7 @@ static void test_clusters(void **state)
         struct pt_plan plan[2];
         for (int way = 0; way < 2; way++) {
             cloud->clusters = way ? NULL : clusters;
-            CHECK(pt_plan_create(scene, &plan[way]), scene);
+            CHECK(pt_plan_create(scene, NULL, &plan[way]), scene);
         }
         cloud->clusters = clusters;
         assert_true(plan[0].chunks_culled == plan[1].chunks_culled && plan[0].spacing_px == plan[1].spacing_px);

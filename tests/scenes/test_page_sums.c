@@ -419,7 +419,7 @@ static uint64_t held_after(patina_device *device, const patina_scene *scene, enu
     struct pt_plan plan;
     uint64_t held = 0;
     int runs = 0, found = 0;
-    CHECK(pt_plan_create(scene, &plan), NULL);
+    CHECK(pt_plan_create(scene, NULL, &plan), NULL);
     CHECK(pt_pager_open(&pager, device, scene), device);
     assert_int_equal(pager.cap, CAP_OF_MANY);
     for (uint32_t i = 0; i < plan.pass_count; i++) {

@@ -531,7 +531,7 @@ static void test_chunks_left_out(void **state)
         CHECK(patina_frame_keep_planes(frame, 1), frame); // they are looked at
         CHECK(patina_frame_render(frame, scene), frame);
         struct pt_plan plan;
-        CHECK(pt_plan_create(scene, &plan), scene);
+        CHECK(pt_plan_create(scene, NULL, &plan), scene);
         const struct pt_buffer *plane = &frame->planes.at[PT_PLANE_TILES][PT_TILE_LEVEL];
         struct pt_tile *tiles = malloc(plane->size);
         struct chunk_view *list = malloc((plan.instances[0].chunk_count + 1) * sizeof *list);

@@ -53,7 +53,7 @@ static inline patina_scene *scene_above(const patina_cloud *cloud, double width,
 static inline struct pt_plan plan_of(const patina_scene *scene)
 {
     struct pt_plan plan;
-    assert_int_equal(pt_plan_create(scene, &plan), PATINA_OK);
+    assert_int_equal(pt_plan_create(scene, NULL, &plan), PATINA_OK);
     return plan;
 }
 

@@ -119,7 +119,7 @@ static void test_plan(void **state)
         struct pt_plan plan;
         uint32_t fills = 0;
         assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
-        assert_int_equal(pt_plan_create(scene, &plan), PATINA_OK);
+        assert_int_equal(pt_plan_create(scene, NULL, &plan), PATINA_OK);
         assert_int_equal(pt_means_of(plan.quality, plan.fill), cases[i].means);
         for (uint32_t k = 0; k < plan.pass_count; k++)
             fills += plan.passes[k].kernel == PT_KERNEL_fill;

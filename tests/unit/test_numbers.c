@@ -158,7 +158,7 @@ static void test_a_picture_of_too_many(void **state)
         add_at(scene, cloud, 2.0 * i);
     see(scene, 2.0, 0.0, 8.0);
     struct pt_plan plan;
-    assert_int_equal(pt_plan_create(scene, &plan), PATINA_ERROR_TOO_MANY_POINTS);
+    assert_int_equal(pt_plan_create(scene, NULL, &plan), PATINA_ERROR_TOO_MANY_POINTS);
     const char *message = support_message(scene);
     printf("  message: %s\n", message);
     char count[32];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A cloud of 22 billion points, of which a thousand pages arrive: what it takes of memory and of time before a picture is drawn (SPEC 14).
+#include "base/pool.h"
 #include "plan/passes.h"
 #include "scene/paged.h"
 #include "scene/parts.h"
@@ -94,7 +95,7 @@ static void plan_and_tell(patina_cloud *cloud, const char *when)
         pt_paged_leave(cloud);
         start = spent();
         struct pt_plan plan;
-        CHECK(pt_plan_create(scene, &plan), scene);
+        CHECK(pt_plan_create(scene, NULL, &plan), scene);
         times[1] = spent() - start;
         pt_plan_destroy(&plan);
         uint32_t count = 0;
@@ -104,6 +105,36 @@ static void plan_and_tell(patina_cloud *cloud, const char *when)
         printf("  %s, %s%s: renewed in %.1f ms, planned in %.1f, %u pages wanted in %.1f\n", when,
                near_by ? "near" : "overview", look < 2 ? "" : " at 4 pixels", times[0], times[1], count, times[2]);
         assert_true(look >= 2 || count > (near_by ? 0 : 300000));
+        patina_scene_destroy(scene);
+    }
+}
+
+// A plan that threads make together is that of one thread.
+static void plan_by_threads(patina_cloud *cloud)
+{
+    for (int look = 0; look < 4; look++) {
+        patina_scene *scene = ground(cloud, look % 2, look < 2 ? 0.0f : 4.0f);
+        struct pt_pool *pool = pt_pool_create(3, 0);
+        struct pt_plan alone, together;
+        assert_non_null(pool);
+        pt_paged_enter(cloud, 1);
+        CHECK(pt_plan_create(scene, NULL, &alone), scene);
+        CHECK(pt_plan_create(scene, pool, &together), scene);
+        pt_paged_leave(cloud);
+        uint32_t chunks = 0;
+        assert_int_equal(alone.instance_count, together.instance_count);
+        for (uint32_t i = 0; i < alone.instance_count; i++) {
+            const struct pt_plan_instance *a = &alone.instances[i], *b = &together.instances[i];
+            assert_int_equal(a->chunk_count, b->chunk_count);
+            assert_memory_equal(a->chunks, b->chunks, a->chunk_count * sizeof *a->chunks);
+            assert_memory_equal(&a->args, &b->args, sizeof a->args);
+            chunks += a->chunk_count;
+        }
+        assert_true(chunks > 0 && alone.points_scattered == together.points_scattered);
+        assert_true(alone.spacing_px == together.spacing_px && alone.ids.points == together.ids.points);
+        pt_plan_destroy(&alone);
+        pt_plan_destroy(&together);
+        pt_pool_destroy(pool);
         patina_scene_destroy(scene);
     }
 }
@@ -135,6 +166,7 @@ static void test_billions(void **state)
         give(cloud, &pages[p], p);
     plan_and_tell(cloud, "a thousand pages arrived");
     plan_and_tell(cloud, "a thousand pages are there");
+    plan_by_threads(cloud);
     CHECK(patina_cloud_get_pages(cloud, &told), cloud);
     printf("  %u pages arrived, %.1f MB in all\n", told.pages_arrived, 1e-6 * (held() - before));
     assert_int_equal(told.pages_arrived, few);

@@ -386,7 +386,7 @@ static void test_no_camera_is_an_error(void **state)
     struct pt_plan plan;
     char message[256];
     assert_int_equal(patina_scene_create(&scene), PATINA_OK);
-    assert_int_equal(pt_plan_create(scene, &plan), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(pt_plan_create(scene, NULL, &plan), PATINA_ERROR_ARGUMENT);
     assert_true(patina_message(scene, message, sizeof message) > 0);
     assert_non_null(strstr(message, "camera"));
     patina_scene_destroy(scene);

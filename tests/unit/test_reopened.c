@@ -274,7 +274,7 @@ static void test_shown_out_of_focus(void **state)
     CHECK(patina_scene_set_camera(scene, &camera), scene);
     CHECK(patina_scene_set_settings(scene, &settings), scene);
     struct pt_plan plan;
-    assert_int_equal(pt_plan_create(scene, &plan), PATINA_OK);
+    assert_int_equal(pt_plan_create(scene, NULL, &plan), PATINA_OK);
     for (uint32_t i = 0; i < plan.pass_count; i++)
         assert_int_equal(plan.passes[i].leaves, 0);
     pt_plan_destroy(&plan);
