@@ -113,9 +113,9 @@ int pt_disk_open(const char *path, struct pt_disk *disk); // folders and pipes o
 void pt_disk_close(struct pt_disk *disk);                 // what is mapped stays
 // Less than `size` bytes come at the file's end alone.
 int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t size, size_t *got);
-// Pages of the file; they go back by pt_pages_free. Writing changes the process's own copy, never the file, but for PT_DISK_SHARED, of a
-// spill. Another process that cuts the file short meanwhile ends this one by a fault: the price of not copying. offset: a multiple of
-// 64 KiB; size: not 0.
+// Pages of the file; they go back by pt_pages_free. They can be read alone, so that no system sets memory aside for them, but for
+// PT_DISK_SHARED, of a spill. Another process that cuts the file short meanwhile ends this one by a fault: the price of not copying.
+// offset: a multiple of 64 KiB; size: not 0.
 enum pt_disk_use { PT_DISK_ONCE, PT_DISK_ANYWHERE, PT_DISK_SHARED }; // read once from end to end; here and there; written too
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data);
 

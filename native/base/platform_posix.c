@@ -260,9 +260,8 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
 
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data)
 {
-    // nothing is reserved for pages that might be written: a file may be larger than the memory
-    *data = mmap(NULL, size, PROT_READ | (use != PT_DISK_ONCE ? PROT_WRITE : 0),
-                 use == PT_DISK_SHARED ? MAP_SHARED : MAP_PRIVATE | MAP_NORESERVE, (int)disk->handle, (off_t)offset);
+    *data = mmap(NULL, size, PROT_READ | (use == PT_DISK_SHARED ? PROT_WRITE : 0),
+                 use == PT_DISK_SHARED ? MAP_SHARED : MAP_PRIVATE, (int)disk->handle, (off_t)offset);
     if (*data == MAP_FAILED) {
         *data = NULL;
         return errno;

@@ -334,13 +334,11 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
 
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data)
 {
-    static const struct {
-        DWORD pages, view;
-    } uses[] = {[PT_DISK_ONCE] = {PAGE_READONLY, FILE_MAP_READ},
-                [PT_DISK_ANYWHERE] = {PAGE_WRITECOPY, FILE_MAP_COPY},
-                [PT_DISK_SHARED] = {PAGE_READWRITE, FILE_MAP_WRITE}};
-    const HANDLE section = CreateFileMappingW((HANDLE)disk->handle, NULL, uses[use].pages, 0, 0, NULL);
-    *data = section ? MapViewOfFile(section, uses[use].view, (DWORD)(offset >> 32), (DWORD)offset, size) : NULL;
+    const int written = use == PT_DISK_SHARED;
+    const HANDLE section = CreateFileMappingW((HANDLE)disk->handle, NULL, written ? PAGE_READWRITE : PAGE_READONLY, 0, 0, NULL);
+    *data = section
+                ? MapViewOfFile(section, written ? FILE_MAP_WRITE : FILE_MAP_READ, (DWORD)(offset >> 32), (DWORD)offset, size)
+                : NULL;
     const int error = *data ? 0 : last_error();
     if (section)
         CloseHandle(section); // the view holds it

@@ -251,9 +251,8 @@ static void test_disk(void **state)
     assert_int_equal(got, 0);
     void *mapped;
     assert_int_equal(pt_disk_map(&disk, 0, 10, PT_DISK_ANYWHERE, &mapped), 0);
-    pt_disk_close(&disk);
-    memset(mapped, 'x', 10); // our copy
-    assert_text(at("été 测试"), "0123456789");
+    pt_disk_close(&disk); // what is mapped stays
+    assert_memory_equal(mapped, "0123456789", 10);
     pt_pages_free(mapped, 10);
 }
 
