@@ -126,8 +126,19 @@ def _hierarchy(source: Source, root: int, root_size: int) -> np.ndarray:
 
 
 def in_order(nodes: np.ndarray) -> np.ndarray:
-    """By depth first."""
-    return nodes[np.lexsort([nodes["key"][:, k] for k in (3, 2, 1, 0)])]
+    """By depth, and along Morton's curve: a picture's ids reach from the first to the last node in view of each of the cloud's parts, so that
+    what lies together in space should do so in numbers, too."""
+    keys = nodes["key"]
+    fine, coarse = (sum(_spread(keys[:, 3 - axis] >> shift) << np.uint64(axis) for axis in range(3)) for shift in (0, 21))
+    return nodes[np.lexsort([fine, coarse, keys[:, 0]])]
+
+
+def _spread(numbers: np.ndarray) -> np.ndarray:
+    """(N,) uint64: the low 21 bits, two places apart."""
+    spread = numbers.astype(np.uint64) & np.uint64(0x1FFFFF)
+    for shift, kept in ((32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249)):
+        spread = (spread | spread << np.uint64(shift)) & np.uint64(kept)
+    return spread
 
 
 def arrange(nodes: np.ndarray, center: np.ndarray, half: float, gap: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -209,6 +209,33 @@ def test_files_of_billions_of_points():
     print(f"  {said}")
 
 
+def test_the_order_of_nodes():
+    """Parents come before what they hold, and of one depth nodes lie along Morton's curve, at any depth: what a picture sees has few numbers between
+    that it does not see, however large the file is."""
+    sys.path.append(str(Path(streaming.__file__).parent))  # the reader runs in a process of its own, where its modules are at hand
+    import copc
+    random = np.random.default_rng(5)
+    nodes = np.zeros(500, copc.ENTRY)
+    nodes["key"][:, 0] = random.integers(0, 31, len(nodes))
+    nodes["key"][:, 1:] = random.integers(0, 1 << 30, (len(nodes), 3)) >> (30 - nodes["key"][:, :1])
+    interleaved = [(int(key[0]), sum((int(key[3 - axis]) >> bit & 1) << (3 * bit + axis) for bit in range(30) for axis in range(3)))
+                   for key in copc.in_order(nodes)["key"]]
+    check(interleaved == sorted(interleaved), "not along the curve")
+
+    levels, a_node, a_part = 10, 63000, 1 << 26  # ground of 22 billion points
+    ground = np.zeros(sum(4 ** level for level in range(levels)), copc.ENTRY)
+    ground["key"] = np.concatenate([np.stack([np.full(4 ** level, level), *(axis.ravel() for axis in np.indices((2 ** level, 2 ** level))),
+                                              np.zeros(4 ** level, int)], 1) for level in range(levels)])
+    keys = copc.in_order(ground)["key"]
+    side = 0.5 ** keys[:, 0]
+    away = (keys[:, 1:3] + 0.5) * side[:, None] - (0.3, 0.4)
+    seen = (np.abs(away[:, 1]) < np.tan(np.radians(5)) * np.abs(away[:, 0]) + side) & (away[:, 0] > -side)  # along x
+    each = a_part // a_node
+    windows = sum(int(np.ptp(np.flatnonzero(part)) + 1) for part in np.split(seen, range(each, len(seen), each)) if part.any())
+    print(f"  {seen.sum() * a_node / 1e9:.2f} of {len(keys) * a_node / 1e9:.1f} billion points in view, {windows * a_node / 1e9:.2f} have numbers")
+    check(windows < 2 * seen.sum(), f"{windows} pages have numbers, {seen.sum()} are in view")
+
+
 def test_a_page_holds_less_than_a_part():
     """More than a page of a file ever has."""
     box, parents = np.tile([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], (2, 1)), np.full(2, -1)
