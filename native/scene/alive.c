@@ -20,3 +20,11 @@ void pt_alive_release(struct pt_alive *alive)
     if (atomic_fetch_sub(&alive->references, 1) == 1)
         free(alive);
 }
+
+void pt_alive_end(struct pt_alive *alive)
+{
+    if (!alive)
+        return;
+    atomic_store(&alive->alive, 0);
+    pt_alive_release(alive);
+}

@@ -203,6 +203,7 @@ uint64_t pt_cloud_stamp(const struct patina_cloud *cloud);
 
 struct pt_alive *pt_alive_create(void); // a handle's own, counted once; NULL without memory
 void pt_alive_release(struct pt_alive *alive);
+void pt_alive_end(struct pt_alive *alive); // by its handle: devices drop their copies at their next picture. NULL is fine
 
 // Caller's arrays. Checks type (types: bits) and components, and makes the stride explicit; no data is fine.
 int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components, uint32_t most_components);

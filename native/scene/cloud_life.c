@@ -38,8 +38,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_page_sums_destroy(cloud->page_sums);
     free(cloud->begins);
     free(cloud->clusters);
-    atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
-    pt_alive_release(cloud->alive);
+    pt_alive_end(cloud->alive);
     pt_handle_destroy(&cloud->handle);
     free(cloud);
 }

@@ -10,6 +10,7 @@
 #include "base/pool.h"
 #include "fingerprint.h"
 #include "paged.h"
+#include "parts.h"
 #include "base/elementary.h"
 
 #include <float.h>
@@ -281,6 +282,7 @@ int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: cloud or out is NULL, or the cloud destroyed");
     *out = NULL;
     int error = pt_take(NULL, "patina_field_create", desc, &checked, sizeof checked);
+    error = error ? error : pt_parts_refuse(cloud, "patina_field_create");
     if (error || (error = pt_whole_enter(cloud, "patina_field_create")))
         return error;
     error = make_field(cloud, &checked, progress, out);
@@ -304,10 +306,7 @@ void patina_field_destroy(patina_field *field)
         return;
     pt_pages_free(field->steps, (field->slots + 1) * sizeof *field->steps);
     free(field->chunks);
-    if (field->alive) {
-        atomic_store(&field->alive->alive, 0);
-        pt_alive_release(field->alive);
-    }
+    pt_alive_end(field->alive);
     pt_alive_release(field->of);
     pt_handle_destroy(&field->handle);
     free(field);

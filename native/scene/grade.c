@@ -7,6 +7,7 @@
 #include "base/platform.h"
 #include "base/elementary.h"
 #include "paged.h"
+#include "parts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -28,8 +29,8 @@ struct grading {
     const uint16_t *scans;
     struct tone *tones;
     uint32_t tone_count;
-    float linear[256]; // of sRGB
-    struct patina_grade *grade;
+    float linear[256];                // of sRGB
+    const struct patina_grade *grade; // of the cloud or of a part, as the cloud
 };
 
 static double to_srgb(double linear)
@@ -158,6 +159,20 @@ int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const 
     return patina_grade_create_balanced(cloud, scans, grades, NULL, count, out);
 }
 
+// As those of a mask.
+static int divide(struct patina_grade *grade, const patina_cloud *cloud)
+{
+    const size_t size = pt_color_size(cloud->color_format);
+    grade->parts = calloc(cloud->part_count, sizeof *grade->parts);
+    for (uint32_t i = 0; grade->parts && i < cloud->part_count; i++) {
+        const struct patina_cloud *part = pt_part(cloud, i);
+        grade->parts[i] = (struct patina_grade){
+            .alive = pt_alive_create(), .size = part->slots * size, .colors = (char *)grade->colors + part->first_slot * size};
+        grade->part_count += grade->parts[i].alive != NULL;
+    }
+    return grade->part_count == cloud->part_count;
+}
+
 static int make_grade(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades, const float *balance,
                       uint32_t count, patina_grade **out)
 {
@@ -171,10 +186,14 @@ static int make_grade(const patina_cloud *cloud, const uint16_t *scans, const pa
         grade->size = cloud->slots * pt_color_size(cloud->color_format);
         grade->colors = pt_pages_alloc(grade->size + 4); // kernels read words
     }
-    const int good = grade && pool && grade->alive && grade->colors && set_tones(&grading, grades, balance);
-    if (good)
-        pt_parallel(pool, cloud->chunk_count, 4, grade_chunks, &grading);
-    else
+    const int good = grade && pool && grade->alive && grade->colors && (!cloud->part_count || divide(grade, cloud)) &&
+                     set_tones(&grading, grades, balance);
+    for (uint32_t i = 0; i < pt_part_count(cloud) && good; i++) {
+        grading.grade = pt_grade_part(grade, i);
+        grading.cloud = pt_part(cloud, i);
+        pt_parallel(pool, grading.cloud->chunk_count, 4, grade_chunks, &grading);
+    }
+    if (!good)
         patina_grade_destroy(grade);
     for (uint32_t i = 0; grading.tones && i < count; i++)
         free(grading.tones[i].encode);
@@ -205,10 +224,10 @@ void patina_grade_destroy(patina_grade *grade)
     if (!grade)
         return;
     pt_pages_free(grade->colors, grade->size + 4);
-    if (grade->alive) {
-        atomic_store(&grade->alive->alive, 0);
-        pt_alive_release(grade->alive);
-    }
+    for (uint32_t i = 0; i < grade->part_count; i++)
+        pt_alive_end(grade->parts[i].alive);
+    free(grade->parts);
+    pt_alive_end(grade->alive);
     pt_alive_release(grade->of);
     pt_handle_destroy(&grade->handle);
     free(grade);

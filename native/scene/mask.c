@@ -4,6 +4,7 @@
 
 #include "base/platform.h"
 #include "paged.h"
+#include "parts.h"
 
 #include <stdlib.h>
 
@@ -14,12 +15,12 @@ struct pt_alive *pt_alive_share(const struct patina_cloud *cloud)
 }
 
 struct fill {
-    struct patina_mask *mask;
-    const struct patina_cloud *cloud;
+    const struct patina_mask *mask;   // of the cloud or a part
+    const struct patina_cloud *cloud; // likewise
     const uint8_t *hidden, *selected;
 };
 
-static uint32_t bit_of(const uint8_t *bits, uint32_t index) { return bits ? bits[index / 8] >> index % 8 & 1u : 0; }
+static uint32_t bit_of(const uint8_t *bits, uint64_t index) { return bits ? bits[index / 8] >> index % 8 & 1u : 0; }
 
 static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
@@ -29,7 +30,7 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         const struct pt_chunk *chunk = &fill->cloud->chunks[c];
         uint32_t *words = fill->mask->words + chunk->first / PT_SLOTS_A_WORD, hidden = 0;
         for (uint32_t i = 0; i < chunk->padded; i++) {
-            const uint32_t number = (uint32_t)pt_number_of(fill->cloud, (uint64_t)chunk->first + i);
+            const uint64_t number = pt_number_of(fill->cloud, (uint64_t)chunk->first + i);
             const uint32_t hides = bit_of(fill->hidden, number), selects = bit_of(fill->selected, number);
             words[i / PT_SLOTS_A_WORD] |= (hides | selects << PT_SLOTS_A_WORD) << i % PT_SLOTS_A_WORD;
             hidden += i < chunk->count && hides;
@@ -48,6 +49,21 @@ static void sum_up(struct patina_mask *mask, uint32_t chunk_count)
         mask->hash = (mask->hash ^ (mask->words[i] & 0xFFFFu)) * 0x100000001B3ull; // FNV-1a
 }
 
+// Masks of the cloud's parts. 0: there is no memory.
+static int divide(struct patina_mask *mask, const patina_cloud *cloud)
+{
+    mask->parts = calloc(cloud->part_count, sizeof *mask->parts);
+    for (uint32_t i = 0; mask->parts && i < cloud->part_count; i++) {
+        const struct patina_cloud *part = pt_part(cloud, i);
+        mask->parts[i] = (struct patina_mask){.alive = pt_alive_create(),
+                                              .word_count = part->slots / PT_SLOTS_A_WORD,
+                                              .words = mask->words + part->first_slot / PT_SLOTS_A_WORD,
+                                              .chunks = mask->chunks + part->first_chunk};
+        mask->part_count += mask->parts[i].alive != NULL;
+    }
+    return mask->part_count == cloud->part_count;
+}
+
 static int make_mask(const patina_cloud *cloud, const uint8_t *hidden, const uint8_t *selected, size_t size, patina_mask **out)
 {
     if (size != (cloud->info.count + 7) / 8)
@@ -63,11 +79,17 @@ static int make_mask(const patina_cloud *cloud, const uint8_t *hidden, const uin
         mask->words = pt_pages_alloc(mask->word_count * sizeof *mask->words);
         mask->chunks = calloc(cloud->chunk_count + 1, 1);
     }
-    const int good = mask && pool && mask->alive && mask->words && mask->chunks;
+    const int good = mask && pool && mask->alive && mask->words && mask->chunks && (!cloud->part_count || divide(mask, cloud));
     if (good) {
-        struct fill fill = {mask, cloud, hidden, selected};
-        pt_parallel(pool, cloud->chunk_count, 4, fill_chunks, &fill);
+        for (uint32_t i = 0; i < pt_part_count(cloud); i++) {
+            struct fill fill = {pt_mask_part(mask, i), pt_part(cloud, i), hidden, selected};
+            pt_parallel(pool, fill.cloud->chunk_count, 4, fill_chunks, &fill);
+        }
         sum_up(mask, cloud->chunk_count);
+        for (uint32_t i = 0; i < mask->part_count; i++) {
+            mask->parts[i].hides = mask->hides;
+            mask->parts[i].hash = mask->hash;
+        }
         *out = mask;
     } else {
         patina_mask_destroy(mask);
@@ -98,10 +120,10 @@ void patina_mask_destroy(patina_mask *mask)
         return;
     pt_pages_free(mask->words, mask->word_count * sizeof *mask->words);
     free(mask->chunks);
-    if (mask->alive) {
-        atomic_store(&mask->alive->alive, 0); // devices drop their copies at their next render
-        pt_alive_release(mask->alive);
-    }
+    for (uint32_t i = 0; i < mask->part_count; i++)
+        pt_alive_end(mask->parts[i].alive);
+    free(mask->parts);
+    pt_alive_end(mask->alive);
     pt_alive_release(mask->of);
     pt_handle_destroy(&mask->handle);
     free(mask);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What somebody did with single points of a cloud: which are hidden and which selected (mask.c), other colours by scan (grade.c), and which are soft (field.c).
-// All belong to instances, not to the cloud: several may show one cloud.
+// All belong to instances, not to the cloud: several may show one cloud. Of a cloud in parts (parts.h) masks and grades have one for each, whose
+// words, chunks and colours begin in theirs: pt_mask_part.
 #ifndef PT_MASK_H
 #define PT_MASK_H
 
@@ -18,13 +19,17 @@ struct patina_mask {
     uint8_t *chunks;        // pt_masked of each
     int hides;              // some point is hidden
     uint64_t hash;          // of what is hidden
+    struct patina_mask *parts; // one for each of the cloud's, with a life of its own; NULL where it is not in parts
+    uint32_t part_count;
 };
 
 struct patina_grade {
     struct pt_handle handle;
     struct pt_alive *alive, *of; // as a mask's
     size_t size;
-    void *colors; // in chunk order, in the cloud's own format
+    void *colors;               // in chunk order, in the cloud's own format
+    struct patina_grade *parts; // as a mask's
+    uint32_t part_count;
 };
 
 enum { PT_FIELD_BINS = 256 }; // of a histogram
@@ -49,6 +54,16 @@ static inline const struct patina_mask *pt_mask_of(const struct pt_instance *ins
 {
     const struct patina_mask *mask = instance->style.mask;
     return mask && mask->hides ? mask : NULL;
+}
+
+// What part i of the cloud is drawn with; NULL of none.
+static inline const struct patina_mask *pt_mask_part(const struct patina_mask *mask, uint32_t i)
+{
+    return mask && mask->parts ? &mask->parts[i] : mask;
+}
+static inline const struct patina_grade *pt_grade_part(const struct patina_grade *grade, uint32_t i)
+{
+    return grade && grade->parts ? &grade->parts[i] : grade;
 }
 
 // The cloud's, counted once more.

@@ -127,10 +127,7 @@ static int build(const patina_mesh_desc *desc, struct patina_mesh *mesh)
 
 static void release(struct patina_mesh *mesh)
 {
-    if (mesh->alive) {
-        atomic_store(&mesh->alive->alive, 0); // devices drop their copies at their next render
-        pt_alive_release(mesh->alive);
-    }
+    pt_alive_end(mesh->alive);
     free(mesh->vertices);
     free(mesh->indices);
     free(mesh);

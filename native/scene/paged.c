@@ -324,8 +324,8 @@ int pt_paged_refuse(const struct patina_cloud *cloud, const char *call)
 
 int pt_whole_enter(const struct patina_cloud *cloud, const char *call)
 {
-    int refused = pt_parts_refuse(cloud, call);
-    if (refused || (refused = pt_paged_refuse(cloud, call)))
+    const int refused = pt_paged_refuse(cloud, call);
+    if (refused)
         return refused;
     pt_paged_enter(cloud, 0); // no picture: what pictures show is no older for it
     if (pt_paged_whole(cloud))

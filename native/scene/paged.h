@@ -17,8 +17,7 @@ void pt_chunks_free(struct patina_cloud *cloud);
 int pt_paged_whole(const struct patina_cloud *cloud);
 // PATINA_ERROR_UNSUPPORTED, with a message that names the call, where points are on their way.
 int pt_paged_refuse(const struct patina_cloud *cloud, const char *call);
-// Around calls that go over all points of a cloud: refuses clouds whose points are on their way, and clouds in parts (parts.h). pt_paged_leave
-// ends it, where it gave 0.
+// Around calls that go over all points of a cloud: refuses clouds whose points are on their way. pt_paged_leave ends it, where it gave 0.
 int pt_whole_enter(const struct patina_cloud *cloud, const char *call);
 
 // Around all that reads chunks beside other pictures. enter: takes in the pages that arrived, if `renew` and nobody else is within.

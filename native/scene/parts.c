@@ -129,10 +129,7 @@ void pt_parts_destroy(struct patina_cloud *cloud)
 {
     for (uint32_t i = 0; i < cloud->part_count; i++) {
         struct patina_cloud *part = &cloud->parts[i];
-        if (part->alive) {
-            atomic_store(&part->alive->alive, 0);
-            pt_alive_release(part->alive);
-        }
+        pt_alive_end(part->alive);
         free(part->begins);
         free(part->clusters);
         pt_handle_destroy(&part->handle);

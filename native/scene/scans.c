@@ -4,6 +4,7 @@
 #include "base/platform.h"
 #include "mask.h"
 #include "paged.h"
+#include "parts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -147,6 +148,7 @@ int patina_scans_create(const patina_cloud *cloud, const uint16_t *scan, const p
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_scans_create: out is NULL");
     *out = NULL;
     int error = check(cloud, scans, count);
+    error = error ? error : pt_parts_refuse(cloud, "patina_scans_create");
     if (error || (error = pt_whole_enter(cloud, "patina_scans_create")))
         return error;
     error = make_scans(cloud, scan, scans, count, out);
@@ -161,10 +163,7 @@ void patina_scans_destroy(patina_scans *scans)
     pt_pages_free(scans->scan, (scans->slots + 2) * sizeof *scans->scan);
     free(scans->chunks);
     free(scans->scans);
-    if (scans->alive) {
-        atomic_store(&scans->alive->alive, 0);
-        pt_alive_release(scans->alive);
-    }
+    pt_alive_end(scans->alive);
     pt_alive_release(scans->of);
     pt_handle_destroy(&scans->handle);
     free(scans);

@@ -213,8 +213,8 @@ static int copy_ramp(patina_cloud_style *style)
     return copy ? PATINA_OK : PATINA_ERROR_MEMORY;
 }
 
-// Sums of what is drawn as range images, and maps of faint points, are not those of all parts together. What is of a cloud's slots (masks,
-// fields, ...) no cloud in parts has.
+// Sums of what is drawn as range images, and maps of faint points, are not those of all parts together. Masks and grades have
+// parts, too; fields and scans no cloud in parts has.
 static int check_parts(const patina_scene *scene, const patina_cloud_style *style, const patina_cloud *cloud)
 {
     const char *lacks = style->surface == PATINA_SURFACE_RANGES ? "range images"
@@ -233,6 +233,8 @@ static int put_part(patina_scene *scene, const patina_cloud *whole, const patina
 {
     struct pt_instance *added = &scene->instances[scene->cloud_count];
     patina_cloud_style own = *style;
+    own.mask = pt_mask_part(style->mask, (uint32_t)(part - pt_part(whole, 0)));
+    own.grade = pt_grade_part(style->grade, (uint32_t)(part - pt_part(whole, 0)));
     if (copy_ramp(&own))
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for the ramp of instance %u", scene->given);
     memmove(added + 1, added, scene->mesh_count * sizeof *added);

@@ -245,8 +245,7 @@ void patina_texture_destroy(patina_texture *texture)
     if (!texture)
         return;
     pt_handle_destroy(&texture->handle);
-    atomic_store(&texture->alive->alive, 0); // devices drop their copies at their next render
-    pt_alive_release(texture->alive);
+    pt_alive_end(texture->alive);
     free(texture->texels);
     free(texture);
 }
