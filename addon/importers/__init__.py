@@ -28,7 +28,8 @@ WHOLE = np.int8 if bpy.app.version >= (4, 2, 0) else np.int32
 
 # ending → module with read(path, filter, progress), steps(path, filter, progress) and preview(path), loaded with its first file
 FORMATS = {".ply": "library", ".xyz": "library", ".txt": "library", ".csv": "library", ".asc": "library", ".pts": "library",
-           ".ptx": "library", ".las": "las", ".laz": "las", ".e57": "e57", ".pcd": "pcd", ".conf": "library"}
+           ".ptx": "library", ".las": "las", ".laz": "las", ".e57": "e57", ".pcd": "pcd", ".conf": "library",
+           ".cloud": "saved"}
 PACKED_SPLATS = {".spz", ".splat", ".ksplat", ".sog"}
 
 

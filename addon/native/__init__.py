@@ -223,10 +223,10 @@ class Cloud(_Handle):
                     finish=take)
 
     @classmethod
-    def open(cls, path: Path) -> Cloud:
-        """A saved cloud, mapped. PatinaError when it is not one of this version."""
+    def open(cls, path: Path, offset: Sequence[float] = (0.0, 0.0, 0.0)) -> Cloud:
+        """A saved cloud, mapped; offset: added to every position, float64. PatinaError when it is not one of this version."""
         cloud = cls.__new__(cls)
-        _Handle.__init__(cloud, os.fsencode(path), create="patina_cloud_open")
+        _Handle.__init__(cloud, os.fsencode(path), (c_double * 3)(*offset), create="patina_cloud_open_at")
         cloud._learn()
         return cloud
 

@@ -323,6 +323,7 @@ CALLS = {
     "patina_cloud_neighbourhoods": (c_void_p, POINTER(Neighbourhoods), c_void_p),
     "patina_cloud_save": (c_void_p, c_char_p),
     "patina_cloud_open": (c_char_p, POINTER(c_void_p)),
+    "patina_cloud_open_at": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_cloud_verify": (c_char_p, c_void_p),
     "patina_cloud_get_info": (c_void_p, POINTER(CloudInfo)),
     "patina_ramp": (c_char_p, c_void_p),

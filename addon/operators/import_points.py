@@ -13,7 +13,7 @@ from bpy.types import Context, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native, styles
-from ..importers import PointFile, name_of, origin, told
+from ..importers import PointFile, name_of, origin, saved, told
 from ..sync import addresses, clouds, files, linked, sequence
 from . import set_up, stations
 from .steps import Stepped
@@ -118,7 +118,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             self._tell('ERROR', "choose a file: a folder alone was given")
             return {'CANCELLED'}
         self._progress = importers.Progress()
-        return self.begin(context, self._link(context) if self.link else self._import(context))
+        links = self.link or all(path.suffix.lower() == saved.ENDING for path in self._paths())  # there is no other way for these
+        return self.begin(context, self._link(context) if links else self._import(context))
 
     def _import(self, context: Context) -> jobs.Steps[set[str]]:
         found, paths = [], self._paths()

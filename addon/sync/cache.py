@@ -12,9 +12,7 @@ import bpy
 from .. import preferences, streaming
 from ..streaming import shelf
 from ..streaming.address import is_address
-from . import kept
-
-_KEPT = ("*.cloud", "*.json", "*.scan", "*-packed.*")
+from . import files, kept
 
 
 def held() -> tuple[int, int]:
@@ -36,8 +34,7 @@ def clear() -> tuple[int, int]:
 
 
 def _files() -> Iterator[Path]:
-    place = kept.folder()
-    return (path for pattern in _KEPT for path in place.glob(pattern) if path.is_file())
+    return (path for path in kept.folder().iterdir() if (kept.is_kept(path) or files.PACKED in path.name) and path.is_file())
 
 
 def keep_of(place: str) -> streaming.Keep | None:

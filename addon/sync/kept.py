@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import threading
 import time
 from collections.abc import Callable
@@ -18,6 +19,14 @@ from typing import Any
 import bpy
 
 from .. import jobs, native, preferences
+
+# Of what is kept of a scan: its place, its state then, what was asked for. Nothing else in the folder, which may be one of the artist's, is ours.
+_NAME = re.compile(r"[0-9a-f]{24}-[0-9a-f]{12}-[0-9a-f]{8}\.(cloud|json|scan)")
+
+
+def is_kept(path: Path) -> bool:
+    """Whether a file has the name of one that is kept here, or belongs to such a one."""
+    return _NAME.fullmatch(path.name) is not None
 
 
 def folder() -> Path:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Linked clouds: objects that name a file which only the library reads. Blender holds a box.
 
-A cloud is built at the first time, analyzed, and saved in Blender's folder of user data; later it is mapped from there.
+A cloud is built at the first time, analyzed, and saved in Blender's folder of user data; later it is mapped from there. A file that is a saved
+cloud is mapped as it is.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import bpy
 import numpy as np
 
 from .. import importers, jobs, native, preferences, streaming
-from ..importers import crs
+from ..importers import crs, saved
 from ..importers import scans as scans_of_files
 from ..importers.origin import PROPERTY
 from ..streaming import shelf
@@ -29,6 +30,8 @@ from .scans_of import SCAN_ENDING, Scans, scans_in
 from .soft import attribute_name
 
 Corner = tuple[float, float, float]
+
+DETAIL = 1e-4  # of a saved cloud, in its units, half of which an origin keeps
 
 
 @dataclass(frozen=True)
@@ -43,9 +46,10 @@ class Source:
     hide_uncolored: bool = False
     pattern: Path | None = None  # of the sequence that it is of
     streamed: bool = False  # a COPC whose points are read as pictures want them
+    state: str = ""  # of a saved cloud
 
     def identity(self) -> tuple:
-        return ("linked", str(self.path), self.kept.name)
+        return ("linked", str(self.path), self.state, self.origin, self.kept.name)
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,8 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str], analyzed: b
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
+    elif path.suffix.lower() == saved.ENDING:  # which may be another one by now, whose box begins elsewhere
+        origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
     scalar, wanted, shown = scalar_name(obj) or attribute_name(obj), bool(analysis.wanted(obj)), obj.patina.hide_uncolored
     found = source(path, origin, scalar, wanted, shown, pattern)
     if found and wanted and not analyzed and not found.kept.exists():
@@ -99,6 +105,8 @@ def source(path: Path | addresses.Address, origin: Corner | None = None, scalar:
         status = path.stat()
     except OSError:
         return None
+    if path.suffix.lower() == saved.ENDING:
+        return Source(path, path, origin, scalar, False, pattern=pattern, state=f"{status.st_size} {status.st_mtime_ns}")
     place = _hash(f"{path.resolve()}{origin or ''}", 12)
     state = _hash(f"{status.st_size} {status.st_mtime_ns}", 6)
     variant = _hash(f"{scalar} {analyzed} {hide_uncolored}", 4)  # several objects may link one file
@@ -138,6 +146,8 @@ def loss(name: str, source: Source, error: Exception, shown: Source | None = Non
 
 def share(source: Source) -> bool:
     """Puts what is kept of a scan beside it, for other machines. Whether it lies there; not where nothing is kept, or the folder may not be written."""
+    if source.kept == source.path:
+        return True
     target = kept.beside(source.path)
     names = [source.kept.with_suffix(ending) for ending in (".json", SCAN_ENDING, source.kept.suffix)]  # the cloud last: with it the rest is there
     if source.kept.parent == target:
@@ -165,6 +175,8 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """The same in steps."""
     if source.streamed:
         return (yield from _stream(source, progress))
+    if source.kept == source.path:
+        return _saved(source)
     found = _opened(source)
     if found:
         return found
@@ -217,6 +229,16 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
     return _linked(cloud, origin, scanners, units, scans and asdict(scans), told, source.kept)
+
+
+def _saved(source: Source) -> Linked:
+    """A saved cloud that the artist names: it is what it is, and nothing of it is made anew."""
+    origin = source.origin
+    if origin is None:
+        with native.Cloud.open(source.path) as cloud:
+            origin = importers.reading.origin_of(*np.array(cloud.box), DETAIL)
+    cloud = native.Cloud.open(source.path, [-value for value in origin])
+    return Linked(cloud, origin, cloud.box, [])
 
 
 def _opened(source: Source) -> Linked | None:
@@ -341,7 +363,7 @@ def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
 def _tidy(newest: Path) -> None:
     """Lets the clouds go that were not used for longest, where all together are too large."""
     clouds = []
-    for path in newest.parent.glob("*.cloud"):
+    for path in filter(kept.is_kept, newest.parent.glob("*.cloud")):
         with contextlib.suppress(OSError):  # another Blender lets it go just now
             status = path.stat()
             clouds.append((-status.st_mtime_ns, status.st_size, path))

@@ -484,7 +484,31 @@ static int read_pages(const char *path, const struct pt_disk *disk, const struct
     return cloud->page_sums ? PATINA_OK : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
 }
 
-static int open_disk(const char *path, const struct pt_disk *disk, struct patina_cloud *cloud)
+// All of a cloud but its points, which lie relative to their chunks. What its stations saw may be pages of the file. 0 or PATINA_ERROR_MEMORY.
+static int move_by(struct patina_cloud *cloud, const double offset[3])
+{
+    struct pt_sights *sights = &cloud->sights;
+    if (sights->room) {
+        struct pt_sight *own = pt_pages_alloc(sights->room * sizeof *own);
+        if (!own)
+            return PATINA_ERROR_MEMORY;
+        memcpy(own, sights->each, sights->room * sizeof *own);
+        pt_pages_free(sights->each, sights->room * sizeof *own);
+        sights->each = own;
+    }
+    for (int k = 0; k < 3; k++) {
+        cloud->info.origin[k] += offset[k];
+        cloud->info.box_min[k] += offset[k];
+        cloud->info.box_max[k] += offset[k];
+        for (uint32_t c = 0; c < cloud->chunk_count; c++)
+            cloud->chunks[c].origin[k] += offset[k];
+        for (uint32_t i = 0; i < sights->count; i++)
+            sights->each[i].place[k] += offset[k];
+    }
+    return PATINA_OK;
+}
+
+static int open_disk(const char *path, const struct pt_disk *disk, const double *offset, struct patina_cloud *cloud)
 {
     struct header header;
     struct pt_section sections[SECTIONS];
@@ -514,8 +538,9 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
     code = code ? code : read_pages(path, disk, &header, pages_at(sections), cloud);
     if (code)
         return code;
+    error = offset ? move_by(cloud, offset) : PATINA_OK;
     pt_clusters_make(cloud);
-    error = pt_parts_make(cloud, pt_part_slots());
+    error = error ? error : pt_parts_make(cloud, pt_part_slots());
     if (!error && cloud->unordered && !cloud->part_count)
         error = pt_cloud_count_places(cloud);
     return error ? pt_fail(NULL, error, "%s: out of memory", path) : PATINA_OK;
@@ -607,21 +632,43 @@ int patina_cloud_verify(const char *path, patina_progress *progress)
 
 // ---- open, all of it ---------------------------------------------------------------------------------------------------
 
-int patina_cloud_open(const char *path, patina_cloud **out)
+#define FARTHEST_OFFSET 1e30
+
+static int open_cloud(const char *path, const double *offset, patina_cloud **out)
 {
-    if (!path || !out)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_open: bad arguments");
     *out = NULL;
     struct pt_disk disk;
     int error = pt_disk_open(path, &disk);
     if (error)
         return fail_with(path, "read", error);
     struct patina_cloud *cloud = pt_cloud_new();
-    const int code = cloud ? open_disk(path, &disk, cloud) : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    const int code = cloud ? open_disk(path, &disk, offset, cloud)
+                           : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
     pt_disk_close(&disk);
     if (code)
         patina_cloud_destroy(cloud);
     else
         *out = cloud;
     return code;
+}
+
+int patina_cloud_open(const char *path, patina_cloud **out)
+{
+    if (!path || !out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_open: bad arguments");
+    return open_cloud(path, NULL, out);
+}
+
+int patina_cloud_open_at(const char *path, const double *offset, patina_cloud **out)
+{
+    if (!path || !out || !offset)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_open_at: bad arguments");
+    int some = 0;
+    for (int k = 0; k < 3; k++) {
+        if (!(fabs(offset[k]) <= FARTHEST_OFFSET))
+            return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_open_at: the offset along %c is %g, and 1e30 is the most",
+                           "xyz"[k], offset[k]);
+        some |= offset[k] != 0.0;
+    }
+    return open_cloud(path, some ? offset : NULL, out);
 }

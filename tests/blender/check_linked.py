@@ -3,22 +3,28 @@
 
 import os
 import time
+from functools import partial
+from pathlib import Path
 
 import bpy
 import numpy as np
 from check_import import columns, import_ply, write_ply
 from harness import SCRATCH, check, check_close, new_scene, patina, render, reports, stats
+from mathutils import Matrix
+from patina import native, preferences
 from patina.importers import las, library
-from patina.sync import linked
+from patina.sync import cache, linked
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
 
 
-def dense(name, count=20000, offset=(0, 0, -4)):
+def dense(name, count=20000, offset=(0, 0, -4), extra=None):
     rng = np.random.default_rng(4)
     directions = rng.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     positions = directions + offset
+    if extra:
+        positions, directions = np.vstack([positions, extra]), np.vstack([directions, directions[:1]])
     data = [(axis, "f8", positions[:, i]) for i, axis in enumerate("xyz")]
     data += [(f"n{axis}", "f4", directions[:, i]) for i, axis in enumerate("xyz")]
     data += [(channel, "u1", (directions[:, i] * 100 + 128).astype(int)) for i, channel in
@@ -59,6 +65,111 @@ def test_opens_from_its_cache():
     linked.load(linked.source(path))
     kept = list(SCRATCH.glob(linked.source(path).kept.name.split("-")[0] + "-*.cloud"))
     check(len(kept) == 1, f"old caches stay: {kept}")
+
+
+def saved(name, like, origin=(0.0, 0.0, 0.0)):
+    """A saved cloud of a file's points, as the command line makes it; so far away."""
+    found = library.read(like, patina.importers.Filter(), patina.importers.Progress())
+    path = SCRATCH / name
+    origin = tuple(own + more for own, more in zip(found.origin, origin, strict=True))
+    native.Cloud(found.positions, found.normals, found.colors, origin=origin).start_save(path).result()
+    return path
+
+
+def test_saved_clouds_are_linked():
+    """As they are: nothing is built, analyzed or kept, and the file stays as it is."""
+    scan, path = dense("scan.ply"), SCRATCH / "site.cloud"
+    new_scene()
+    import_ply(scan, link=True)
+    of_scan = render()
+    path.write_bytes(linked.source(scan).kept.read_bytes())
+    state, before = path.stat(), set(SCRATCH.iterdir())
+    new_scene()
+    import_ply(path, link=True)
+    of_cloud = render()
+    for name, pixels in of_scan.items():
+        check((pixels == of_cloud[name]).all(), f"{name} differs")
+    now = path.stat()
+    check((now.st_mtime_ns, now.st_size, now.st_ino) == (state.st_mtime_ns, state.st_size, state.st_ino) and set(SCRATCH.iterdir()) == before, f"{set(SCRATCH.iterdir()) - before}")
+    check(linked.share(linked.source(path)) and not (SCRATCH / ".patina").exists(), "it is copied beside itself")
+    saved("site.cloud", dense("other.ply", 300))  # in its place
+    again = render()
+    check("300 points" in stats[-1] and (again["Combined"] != of_cloud["Combined"]).any(), stats[-1])
+
+
+def test_saved_clouds_far_away():
+    """Of a survey's coordinates the object remembers the origin, and the picture is that of points near zero, but for float64's roundings."""
+    scan, far = dense("survey.ply"), (485432.0, 5428765.0, 312.0)
+    pictures = []
+    for name, origin in (("near.cloud", (0.0, 0.0, 0.0)), ("far.cloud", far)):
+        new_scene()
+        obj, = import_ply(saved(name, scan, origin), link=True, origin='SHARED')
+        place = np.array(obj["patina_origin"]) if "patina_origin" in obj else np.zeros(3)
+        corners = np.array([vertex.co for vertex in obj.data.vertices])
+        check_close(corners.min(0) + place, np.array([-1.0, -1.0, -5.0]) + origin, 2e-2, "the box")
+        check((place != 0).all() == (origin == far), f"{place}")
+        obj.matrix_world = Matrix.Translation(place - origin)
+        obj.patina.analysis = 'OFF'
+        pictures.append(render())
+    off = np.abs(pictures[0]["Combined"] - pictures[1]["Combined"]).max(axis=-1)
+    check((pictures[0]["Combined"][..., 3] > 0).mean() > 0.05 and (off > 0.02).mean() < 0.002, f"{(off > 0.02).mean():.4f} of the pixels differ")
+
+
+def test_saved_clouds_that_are_none():
+    good = saved("good.cloud", dense("good.ply", 100)).read_bytes()
+    for name, data, told in (("cut", good[:5000], "cut short"), ("text", b"x y z", "not a saved cloud"), ("empty", b"", "not a saved cloud")):
+        path = SCRATCH / f"{name}.cloud"
+        path.write_bytes(data)
+        new_scene()
+        try:
+            import_ply(path, link=True)
+        except RuntimeError as error:
+            check(told in str(error), str(error))
+        else:
+            raise AssertionError(f"{name} is linked")
+        check(path.read_bytes() == data, f"{name} is thrown away")
+    obj, = import_ply(SCRATCH / "good.cloud")  # which links it, whatever is asked for
+    check(obj.patina.linked_file.endswith("good.cloud"), "it is not linked")
+    for operator in (bpy.ops.object.patina_linked_to_mesh, partial(bpy.ops.export_scene.patina_points, filepath=str(SCRATCH / "out.ply"))):
+        try:
+            operator()
+        except RuntimeError as error:
+            check("its points are not read into Blender" in str(error), str(error))
+        else:
+            raise AssertionError(f"{operator} reads it")
+    check("100 points" in patina.importers.preview(SCRATCH / "good.cloud")[1], "the file dialog's preview")
+
+
+def test_saved_clouds_among_kept_ones():
+    """The folder of what is kept may be one that the artist has such files in: they are not ours to let go."""
+    good = saved("town.cloud", dense("good.ply", 100))
+    beside = [good, SCRATCH / "town.json", SCRATCH / "town.scan"]
+    for path in beside[1:]:
+        path.write_text("{}")
+    most, preferences.cache_bytes = preferences.cache_bytes, lambda: 0
+    try:
+        for name in ("first.ply", "second.ply"):
+            linked.load(linked.source(dense(name, 5000)))
+    finally:
+        preferences.cache_bytes = most
+    check(not linked.source(SCRATCH / "first.ply").kept.exists() and linked.source(SCRATCH / "second.ply").kept.exists(), "nothing is let go")
+    cache.clear()
+    check(not linked.source(SCRATCH / "second.ply").kept.exists() and all(path.exists() for path in beside), f"{list(map(Path.exists, beside))}")
+
+
+def test_saved_clouds_that_are_replaced():
+    """By one whose box begins elsewhere: its points lie where they lay in the survey."""
+    near, far = dense("near.ply"), (485432.0, 5428765.0, 312.0)
+    new_scene()
+    obj, = import_ply(saved("again.cloud", near, far), link=True)
+    obj.patina.analysis = 'OFF'
+    obj.matrix_world = Matrix.Translation(np.array(obj["patina_origin"]) - far)
+    first = render()
+    saved("again.cloud", dense("wider.ply", extra=(-1.7, 0.0, -4.0)), far)
+    second = render()
+    check("20,001 points" in stats[-1], stats[-1])
+    off = np.abs(first["Combined"] - second["Combined"]).max(axis=-1)
+    check((off > 0.02).mean() < 0.01, f"{(off > 0.02).mean():.4f} of the pixels differ")
 
 
 def test_missing_file():

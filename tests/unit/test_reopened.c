@@ -254,6 +254,60 @@ static void test_alike(void **state)
     unlink(path);
 }
 
+// Opened with an offset, and placed back by it: the same points, and what the stations saw of them.
+static void test_opened_elsewhere(void **state)
+{
+    (void)state;
+    static const double offset[3] = {-485432.0, 5428765.0, 312.5}, nowhere[3] = {0.0, NAN, 0.0};
+    const patina_settings settings = settings_of();
+    const patina_camera camera = camera_at(1);
+    patina_cloud *opened = NULL, *moved = NULL;
+    char path[] = "/tmp/elsewhere-XXXXXX";
+    const int descriptor = mkstemp(path);
+    assert_true(descriptor >= 0);
+    close(descriptor);
+    CHECK(patina_cloud_save(asked, path), asked);
+    CHECK(patina_cloud_open(path, &opened), NULL);
+    CHECK(patina_cloud_open_at(path, offset, &moved), NULL);
+    patina_cloud_info info[2] = {{.struct_size = sizeof *info}, {.struct_size = sizeof *info}};
+    patina_cloud_get_info(opened, &info[0]);
+    patina_cloud_get_info(moved, &info[1]);
+    assert_true(opened->sights.count == 2 && moved->sights.count == 2);
+    patina_cloud_style style = {
+        .struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .free_space = PATINA_FREE_SPACE_USE};
+    for (int k = 0; k < 3; k++) {
+        assert_true(fabs(info[1].box_min[k] - info[0].box_min[k] - offset[k]) < 1e-9);
+        assert_true(fabs(info[1].box_max[k] - info[0].box_max[k] - offset[k]) < 1e-9);
+        assert_true(info[1].origin[k] == offset[k]);
+        style.world_from_object[5 * k] = 1.0;
+        style.world_from_object[4 * k + 3] = -offset[k];
+    }
+    style.world_from_object[15] = 1.0;
+    patina_device *device = support_device_open("cpu", 0, 0);
+    patina_scene *scene = scene_of(moved, &style);
+    struct picture there = picture_render(device, scene, &camera, &settings),
+                   here = draw(device, opened, PATINA_FREE_SPACE_USE, 1, &settings, NULL),
+                   unused = draw(device, opened, PATINA_FREE_SPACE_OFF, 1, &settings, NULL);
+    uint64_t other = 0, used = 0;
+    for (uint64_t i = 0; i < WIDTH * HEIGHT; i++) {
+        other += there.keys[i] != here.keys[i] && key_id(there.keys[i]) != key_id(here.keys[i]);
+        used += unused.keys[i] != here.keys[i];
+    }
+    printf("  %llu pixels show another point, %llu what the stations looked through\n", (unsigned long long)other,
+           (unsigned long long)used);
+    assert_true(other * 1000 < WIDTH * HEIGHT && used > 20 * other);
+    assert_int_equal(patina_cloud_open_at(path, nowhere, &moved), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_cloud_open_at(path, NULL, &moved), PATINA_ERROR_ARGUMENT);
+    picture_free(&there);
+    picture_free(&here);
+    picture_free(&unused);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(moved);
+    patina_cloud_destroy(opened);
+    patina_device_destroy(device);
+    unlink(path);
+}
+
 // What is shown of free space comes behind shading; depth of field then may not be drawn over what the others still read.
 static void test_shown_out_of_focus(void **state)
 {
@@ -297,7 +351,7 @@ static void test_shown_out_of_focus(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_slit), cmocka_unit_test(test_alike),
-                                       cmocka_unit_test(test_shown_out_of_focus)};
+                                       cmocka_unit_test(test_opened_elsewhere), cmocka_unit_test(test_shown_out_of_focus)};
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, make_asked, free_asked);
 }

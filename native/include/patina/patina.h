@@ -302,10 +302,13 @@ PATINA_API int patina_cloud_neighbourhoods(const patina_cloud *cloud, const pati
 // cloud is open its file may be replaced (patina_cloud_save does), not written into. A cloud of a file with damaged pages is not saved
 // (PATINA_ERROR_FORMAT, which names them): they would pass as good. patina_cloud_save_as makes it smaller.
 PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
-// A file may hold any number of points. One of more than 2147483647 slots (points, and padding of chunks) is drawn, told of, saved, and given
-// colours and scalars like any; patina_cloud_analyse, patina_cloud_neighbourhoods, masks, grades, scans and fields refuse it
+// A file may hold any number of points. One of more than 2147483647 slots (points, and padding of chunks) is drawn, told of, saved, masked,
+// graded, and given colours and scalars like any; patina_cloud_analyse, patina_cloud_neighbourhoods, scans and fields refuse it
 // (PATINA_ERROR_TOO_MANY_POINTS) and change nothing.
 PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
+// The same, with an offset added to every position, in float64: of a survey at 5,000,000 m, for one, that whose coordinates are wanted near
+// zero. No point is read or written for it. offset: 3 numbers of at most 1e30.
+PATINA_API int patina_cloud_open_at(const char *path, const double *offset, patina_cloud **out);
 // Reads a saved cloud whole and compares the sum of each of its sections with that of the writing, which opening leaves out but
 // for the chunks: PATINA_ERROR_FORMAT where any differs. progress: may be NULL; stops it too. Any thread, open clouds or not.
 PATINA_API int patina_cloud_verify(const char *path, patina_progress *progress);
