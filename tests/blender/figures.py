@@ -4,7 +4,7 @@
     xvfb-run -a -s "-screen 0 1280x800x24" blender --enable-event-simulate --factory-startup \\
         --python tests/blender/test_window.py -- figures
 
-PATINA_FIGURES_POINTS says how many. The last line but one of what it prints is JSON. What Blender takes for its window and
+PATINA_FIGURES_POINTS says how many, of a ball; PATINA_FIGURES_FILE a saved cloud that is linked instead, and seen from above. The last line but one of what it prints is JSON. What Blender takes for its window and
 what Patina takes are told apart, for under Xvfb both run on the same cores.
 
 The view is orbited as a user does it, with the middle mouse button: Blender then redraws the view alone. A script that turns
@@ -14,6 +14,7 @@ it through its properties has all of Blender's editors redrawn.
 import json
 import os
 import time
+from pathlib import Path
 from statistics import median, mode
 
 import gpu
@@ -21,7 +22,7 @@ import numpy as np
 from harness import add_points
 from mathutils import Quaternion
 from patina import viewport
-from window import area, settled, setup, shown, view, window_region
+from window import area, invoke_import, settled, setup, shown, view, window_region
 
 SECONDS = 6.0  # of each kind of motion
 
@@ -110,14 +111,30 @@ def delivered(found, seconds):
     return count / (time.perf_counter() - start), busy / count
 
 
-def orbit_figures():
-    scene = setup()
-    scene.patina.fill = 'CLOSED'
-    count = int(os.environ.get("PATINA_FIGURES_POINTS", "10000000"))
+def ball(count):
     rng = np.random.default_rng(1)
     directions = rng.normal(size=(count, 3)).astype(np.float32)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     add_points(directions * 1.5, None, directions)
+
+
+def link(path):
+    """A saved cloud, framed and seen from above."""
+    view().view_rotation = Quaternion((1, 0, 0), 0.9)
+    area().spaces[0].clip_end = 1e5
+    invoke_import(Path(path), link=True, frame=True)
+
+
+def orbit_figures():
+    scene = setup()
+    path, count = os.environ.get("PATINA_FIGURES_FILE"), int(os.environ.get("PATINA_FIGURES_POINTS", "10000000"))
+    if path:
+        link(path)
+        yield lambda: (found := shown()) is not None and found.shown.stats["points"] > 0
+        count = shown().shown.stats["points"]
+    else:
+        scene.patina.fill = 'CLOSED'
+        ball(count)
     yield lambda: settled(count)
     found, region = shown(), window_region()
     figures = {"points": count, "width": region.width, "height": region.height,
