@@ -118,11 +118,21 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             self._tell('ERROR', "choose a file: a folder alone was given")
             return {'CANCELLED'}
         self._progress = importers.Progress()
-        links = self.link or all(path.suffix.lower() == saved.ENDING for path in self._paths())  # there is no other way for these
-        return self.begin(context, self._link(context) if links else self._import(context))
+        return self.begin(context, self._link(context, self._paths()) if self.link else self._take(context))
 
-    def _import(self, context: Context) -> jobs.Steps[set[str]]:
-        found, paths = [], self._paths()
+    def _take(self, context: Context) -> jobs.Steps[set[str]]:
+        """Imports what can be imported, and links saved clouds, for which there is no other way."""
+        links = [path for path in self._paths() if path.suffix.lower() == saved.ENDING]
+        reads = [path for path in self._paths() if path not in links]
+        done = {'CANCELLED'}
+        if reads:
+            done = yield from self._import(context, reads)
+        if links:
+            done = (yield from self._link(context, links)) | done
+        return done - {'CANCELLED'} or done
+
+    def _import(self, context: Context, paths: list[Path]) -> jobs.Steps[set[str]]:
+        found = []
         for index, path in enumerate(paths):
             try:
                 points = yield from self._read(path, self._progress.part(index, len(paths)))
@@ -184,9 +194,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
     def _tell(self, kind: str, text: str) -> None:
         self.report({kind}, told(f"Patina: {text}"))
 
-    def _link(self, context: Context) -> jobs.Steps[set[str]]:
+    def _link(self, context: Context, paths: list[Path]) -> jobs.Steps[set[str]]:
         found: dict[Path, linked.Linked] = {}  # by the path or pattern that objects shall name
-        paths = self._paths()
         for index, path in enumerate(paths):
             name, first = self._named(path)
             if name in found:
@@ -209,7 +218,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             return {'CANCELLED'}
         _select_none()
         for path, item in found.items():
-            name = told(name_of(path).replace("#", "").rstrip("_-. ") or path.stem if self.sequence else name_of(path))
+            name = told(name_of(path).replace("#", "").rstrip("_-. ") or path.stem if self.sequence and self.link else name_of(path))
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box, item))
             files.assign(obj, files.as_preferred(path))
             obj.patina.sequence.start = context.scene.frame_start
@@ -222,7 +231,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
 
     def _named(self, path: Path) -> tuple[Path, Path]:
         """What an object names, and the file to read now: of a sequence its pattern and its first file."""
-        pattern = sequence.pattern_of(path) if self.sequence else None
+        pattern = sequence.pattern_of(path) if self.sequence and self.link else None
         files = sequence.files_of(pattern) if pattern else {}
         return (pattern, files[min(files)]) if files else (path, path)
 

@@ -12,7 +12,7 @@ import bpy
 from .. import preferences, streaming
 from ..streaming import shelf
 from ..streaming.address import is_address
-from . import files, kept
+from . import kept
 
 
 def held() -> tuple[int, int]:
@@ -34,7 +34,7 @@ def clear() -> tuple[int, int]:
 
 
 def _files() -> Iterator[Path]:
-    return (path for path in kept.folder().iterdir() if (kept.is_kept(path) or files.PACKED in path.name) and path.is_file())
+    return (path for path in kept.folder().iterdir() if (kept.is_of_scan(path) or kept.is_packed(path)) and path.is_file())
 
 
 def keep_of(place: str) -> streaming.Keep | None:

@@ -22,7 +22,6 @@ from ..streaming.address import is_ept
 from . import addresses, kept, sequence
 
 _TEXT = "linked_file"
-PACKED = "-packed"  # in the names of packed files that were put down
 _unpacked: dict[tuple[int, int], Path] = {}  # of packed files, by place in memory and size
 
 
@@ -83,7 +82,7 @@ def _put_down(packed: bpy.types.PackedFile, path: Path) -> Path:
     if known is None or not known.is_file():
         data = packed.data
         name = hashlib.blake2b(data, digest_size=12).hexdigest()
-        known = kept.folder() / f"{name}{PACKED}{path.suffix}"
+        known = kept.folder() / f"{name}-packed{path.suffix}"
         if not known.is_file():
             known.write_bytes(data)
             os.utime(known, (0, 0))  # what is made of it is good for every copy

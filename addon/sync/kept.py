@@ -20,13 +20,18 @@ import bpy
 
 from .. import jobs, native, preferences
 
-# Of what is kept of a scan: its place, its state then, what was asked for. Nothing else in the folder, which may be one of the artist's, is ours.
-_NAME = re.compile(r"[0-9a-f]{24}-[0-9a-f]{12}-[0-9a-f]{8}\.(cloud|json|scan)")
+# Of what is kept of a scan: its place, its state then, what was asked for; and of packed files that were put down, their sum. Nothing else in the
+# folder, which may be one of the artist's, is ours.
+_OF_SCAN, _PACKED = re.compile(r"[0-9a-f]{24}-[0-9a-f]{12}-[0-9a-f]{8}\.(cloud|json|scan)"), re.compile(r"[0-9a-f]{24}-packed\..+")
 
 
-def is_kept(path: Path) -> bool:
-    """Whether a file has the name of one that is kept here, or belongs to such a one."""
-    return _NAME.fullmatch(path.name) is not None
+def is_of_scan(path: Path) -> bool:
+    """Whether a file has the name of a kept cloud, or of what belongs to one."""
+    return _OF_SCAN.fullmatch(path.name) is not None
+
+
+def is_packed(path: Path) -> bool:
+    return _PACKED.fullmatch(path.name) is not None
 
 
 def folder() -> Path:

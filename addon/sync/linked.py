@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import math
 import os
 import shutil
 from dataclasses import asdict, dataclass
@@ -21,7 +22,7 @@ import numpy as np
 from .. import importers, jobs, native, preferences, streaming
 from ..importers import crs, saved
 from ..importers import scans as scans_of_files
-from ..importers.origin import PROPERTY
+from ..importers.origin import PROPERTY, TOGETHER
 from ..streaming import shelf
 from . import addresses, analysis, analyzing, attributes, building, cache, files, kept, sequence
 from .colors import scalar_name
@@ -31,7 +32,7 @@ from .soft import attribute_name
 
 Corner = tuple[float, float, float]
 
-DETAIL = 1e-4  # of a saved cloud, in its units, half of which an origin keeps
+DETAIL = 1e-3  # of a saved cloud, in its units, half of which an origin keeps
 
 
 @dataclass(frozen=True)
@@ -233,10 +234,11 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
 
 def _saved(source: Source) -> Linked:
     """A saved cloud that the artist names: it is what it is, and nothing of it is made anew."""
+    with native.Cloud.open(source.path) as cloud:
+        box = np.array(cloud.box)
     origin = source.origin
-    if origin is None:
-        with native.Cloud.open(source.path) as cloud:
-            origin = importers.reading.origin_of(*np.array(cloud.box), DETAIL)
+    if origin is None or math.dist(np.clip(origin, *box), origin) > TOGETHER:  # one of elsewhere, which came in its place
+        origin = importers.reading.origin_of(*box, DETAIL)
     cloud = native.Cloud.open(source.path, [-value for value in origin])
     return Linked(cloud, origin, cloud.box, [])
 
@@ -363,7 +365,7 @@ def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
 def _tidy(newest: Path) -> None:
     """Lets the clouds go that were not used for longest, where all together are too large."""
     clouds = []
-    for path in filter(kept.is_kept, newest.parent.glob("*.cloud")):
+    for path in filter(kept.is_of_scan, newest.parent.glob("*.cloud")):
         with contextlib.suppress(OSError):  # another Blender lets it go just now
             status = path.stat()
             clouds.append((-status.st_mtime_ns, status.st_size, path))

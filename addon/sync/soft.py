@@ -24,6 +24,9 @@ _MISSING = {'ATTRIBUTE': "attribute '{name}'", 'LUMINANCE': "colors", 'CLASSES':
 Desc = tuple[tuple[str, Any], ...]  # of patina_field_desc
 
 
+MOST_OF_FIELD = 2 ** 31 - 1  # points that the library makes a field of
+
+
 @dataclass(frozen=True)
 class Soft:
     """What a picture needs to know of one object's soft points; cheap to compare."""
@@ -38,6 +41,8 @@ class Soft:
         """What the cloud lacks for it, for the artist; "": nothing."""
         if cloud.stream and self.by != 'ALL':
             return "whole cloud, being read as needed (Linked File > Read Whole),"
+        if cloud.count > MOST_OF_FIELD and self.by != 'ALL':
+            return f"number a point, for it holds more than {MOST_OF_FIELD:,},"
         lacks = {'ATTRIBUTE': cloud.numbers is None and not cloud.has_scalars, 'LUMINANCE': not cloud.has_colors,
                  'CLASSES': not cloud.has_classes, 'DISTANCE': not self.placed}
         return _MISSING[self.by].format(name=self.name) if lacks.get(self.by) else ""

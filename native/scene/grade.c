@@ -193,6 +193,8 @@ static int make_grade(const patina_cloud *cloud, const uint16_t *scans, const pa
         grading.cloud = pt_part(cloud, i);
         pt_parallel(pool, grading.cloud->chunk_count, 4, grade_chunks, &grading);
     }
+    if (good && cloud->part_count)
+        pt_cloud_return(cloud); // a large file's colours and order were read
     if (!good)
         patina_grade_destroy(grade);
     for (uint32_t i = 0; grading.tones && i < count; i++)

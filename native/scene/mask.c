@@ -85,6 +85,8 @@ static int make_mask(const patina_cloud *cloud, const uint8_t *hidden, const uin
             struct fill fill = {pt_mask_part(mask, i), pt_part(cloud, i), hidden, selected};
             pt_parallel(pool, fill.cloud->chunk_count, 4, fill_chunks, &fill);
         }
+        if (cloud->part_count)
+            pt_cloud_return(cloud); // a large file's order was read
         sum_up(mask, cloud->chunk_count);
         for (uint32_t i = 0; i < mask->part_count; i++) {
             mask->parts[i].hides = mask->hides;

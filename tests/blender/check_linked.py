@@ -143,7 +143,7 @@ def test_saved_clouds_that_are_none():
 def test_saved_clouds_among_kept_ones():
     """The folder of what is kept may be one that the artist has such files in: they are not ours to let go."""
     good = saved("town.cloud", dense("good.ply", 100))
-    beside = [good, SCRATCH / "town.json", SCRATCH / "town.scan"]
+    beside = [good, SCRATCH / "town.json", SCRATCH / "town.scan", SCRATCH / "town-packed.cloud"]
     for path in beside[1:]:
         path.write_text("{}")
     most, preferences.cache_bytes = preferences.cache_bytes, lambda: 0
@@ -157,8 +157,18 @@ def test_saved_clouds_among_kept_ones():
     check(not linked.source(SCRATCH / "second.ply").kept.exists() and all(path.exists() for path in beside), f"{list(map(Path.exists, beside))}")
 
 
+def test_saved_clouds_among_other_files():
+    """Each comes as it can: Sequence, which belongs to Link, counts for none of them."""
+    paths = [saved("town_1.cloud", dense("good.ply", 100)), saved("town_2.cloud", dense("good.ply", 200)), dense("mesh.ply", 300)]
+    new_scene()
+    objects = import_ply(*paths, sequence=True)
+    check([(bool(obj.patina.linked_file), len(obj.data.vertices)) for obj in objects] == [(False, 300), (True, 8), (True, 8)],
+          f"{[(obj.name, obj.patina.linked_file) for obj in objects]}")
+    check([Path(obj.patina.linked_file).name for obj in objects[1:]] == ["town_1.cloud", "town_2.cloud"], "other files")
+
+
 def test_saved_clouds_that_are_replaced():
-    """By one whose box begins elsewhere: its points lie where they lay in the survey."""
+    """By one whose box begins elsewhere: its points lie where they lay in the survey. By one of elsewhere: near its own origin."""
     near, far = dense("near.ply"), (485432.0, 5428765.0, 312.0)
     new_scene()
     obj, = import_ply(saved("again.cloud", near, far), link=True)
@@ -170,6 +180,9 @@ def test_saved_clouds_that_are_replaced():
     check("20,001 points" in stats[-1], stats[-1])
     off = np.abs(first["Combined"] - second["Combined"]).max(axis=-1)
     check((off > 0.02).mean() < 0.01, f"{(off > 0.02).mean():.4f} of the pixels differ")
+    obj.matrix_world = Matrix.Identity(4)
+    saved("again.cloud", near)
+    check((render()["Combined"][..., 3] > 0).mean() > 0.05, "a cloud of elsewhere is not seen")
 
 
 def test_missing_file():

@@ -17,7 +17,8 @@ extern "C" {
 // What somebody did with single points of a cloud: bits, of point i in the given order bit i % 8 of byte i / 8. hidden, selected:
 // (count + 7) / 8 bytes each, `size` says so; NULL = none. Copied; 4 bytes for 16 points. The mask is of this cloud alone, is
 // given to scenes by style.mask, and never changes: after an edit make another. Any number of masks of one cloud. Like grades, scans and
-// fields PATINA_ERROR_UNSUPPORTED while points of the cloud are on their way (pages.h).
+// fields PATINA_ERROR_UNSUPPORTED while points of the cloud are on their way (pages.h), and PATINA_ERROR_TOO_MANY_POINTS of one in pages of more
+// than 2^31 - 1 points.
 PATINA_API int patina_mask_create(const patina_cloud *cloud, const uint8_t *hidden, const uint8_t *selected, size_t size,
                                   patina_mask **out);
 PATINA_API void patina_mask_destroy(patina_mask *mask);
