@@ -8,7 +8,10 @@ from pathlib import Path
 from .. import jobs, native
 from .reading import Filter, PointFile, Progress
 
-ENDING = ".cloud"
+
+def is_saved(path: Path) -> bool:
+    """By its name."""
+    return path.suffix.lower() == ".cloud"
 
 
 def preview(path: Path) -> list[str]:

@@ -122,13 +122,10 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
 
     def _take(self, context: Context) -> jobs.Steps[set[str]]:
         """Imports what can be imported, and links saved clouds, for which there is no other way."""
-        links = [path for path in self._paths() if path.suffix.lower() == saved.ENDING]
-        reads = [path for path in self._paths() if path not in links]
-        done = {'CANCELLED'}
+        links, reads = ([path for path in self._paths() if saved.is_saved(path) == kind] for kind in (True, False))
+        done = (yield from self._link(context, links)) if links else set()  # first: Esc ends what is read
         if reads:
-            done = yield from self._import(context, reads)
-        if links:
-            done = (yield from self._link(context, links)) | done
+            done |= yield from self._import(context, reads)
         return done - {'CANCELLED'} or done
 
     def _import(self, context: Context, paths: list[Path]) -> jobs.Steps[set[str]]:

@@ -22,7 +22,7 @@ import numpy as np
 from .. import importers, jobs, native, preferences, streaming
 from ..importers import crs, saved
 from ..importers import scans as scans_of_files
-from ..importers.origin import PROPERTY, TOGETHER
+from ..importers.origin import PROPERTY, TOGETHER, ZERO
 from ..streaming import shelf
 from . import addresses, analysis, analyzing, attributes, building, cache, files, kept, sequence
 from .colors import scalar_name
@@ -48,6 +48,11 @@ class Source:
     pattern: Path | None = None  # of the sequence that it is of
     streamed: bool = False  # a COPC whose points are read as pictures want them
     state: str = ""  # of a saved cloud
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether the file is a cloud as it is."""
+        return self.kept == self.path
 
     def identity(self) -> tuple:
         return ("linked", str(self.path), self.state, self.origin, self.kept.name)
@@ -86,7 +91,7 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str], analyzed: b
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
-    elif path.suffix.lower() == saved.ENDING:  # which may be another one by now, whose box begins elsewhere
+    elif saved.is_saved(path):  # which may be another one by now, whose box begins elsewhere
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
     scalar, wanted, shown = scalar_name(obj) or attribute_name(obj), bool(analysis.wanted(obj)), obj.patina.hide_uncolored
     found = source(path, origin, scalar, wanted, shown, pattern)
@@ -106,7 +111,7 @@ def source(path: Path | addresses.Address, origin: Corner | None = None, scalar:
         status = path.stat()
     except OSError:
         return None
-    if path.suffix.lower() == saved.ENDING:
+    if saved.is_saved(path):
         return Source(path, path, origin, scalar, False, pattern=pattern, state=f"{status.st_size} {status.st_mtime_ns}")
     place = _hash(f"{path.resolve()}{origin or ''}", 12)
     state = _hash(f"{status.st_size} {status.st_mtime_ns}", 6)
@@ -147,7 +152,7 @@ def loss(name: str, source: Source, error: Exception, shown: Source | None = Non
 
 def share(source: Source) -> bool:
     """Puts what is kept of a scan beside it, for other machines. Whether it lies there; not where nothing is kept, or the folder may not be written."""
-    if source.kept == source.path:
+    if source.is_saved:
         return True
     target = kept.beside(source.path)
     names = [source.kept.with_suffix(ending) for ending in (".json", SCAN_ENDING, source.kept.suffix)]  # the cloud last: with it the rest is there
@@ -176,7 +181,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """The same in steps."""
     if source.streamed:
         return (yield from _stream(source, progress))
-    if source.kept == source.path:
+    if source.is_saved:
         return _saved(source)
     found = _opened(source)
     if found:
@@ -234,12 +239,13 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
 
 def _saved(source: Source) -> Linked:
     """A saved cloud that the artist names: it is what it is, and nothing of it is made anew."""
-    with native.Cloud.open(source.path) as cloud:
-        box = np.array(cloud.box)
-    origin = source.origin
-    if origin is None or math.dist(np.clip(origin, *box), origin) > TOGETHER:  # one of elsewhere, which came in its place
-        origin = importers.reading.origin_of(*box, DETAIL)
+    origin = source.origin or ZERO
     cloud = native.Cloud.open(source.path, [-value for value in origin])
+    if source.origin is None or math.dist(np.clip(ZERO, *cloud.box), ZERO) > TOGETHER:  # one of elsewhere, which came in its place
+        own = importers.reading.origin_of(*np.add(cloud.box, origin), DETAIL)
+        if own != origin:
+            cloud.close()
+            origin, cloud = own, native.Cloud.open(source.path, [-value for value in own])
     return Linked(cloud, origin, cloud.box, [])
 
 

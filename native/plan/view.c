@@ -257,7 +257,7 @@ struct place {
 static const struct seen *next_seen(const struct survey *survey, uint32_t i, struct place *at)
 {
     const struct looked *block = &survey->looked[i][at->block];
-    while (block->last ? 0 : at->seen == block->count) {
+    while (!block->last && at->seen == block->count) {
         *at = (struct place){at->block + 1, 0};
         block++;
     }

@@ -6,7 +6,6 @@
 #include "base/platform.h"
 #include "base/progress.h"
 #include "paged.h"
-#include "parts.h"
 #include "shared/words.h"
 
 #include <math.h>
@@ -180,8 +179,7 @@ int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbou
     if (walks && (wanted->neighbours < 1 || wanted->neighbours > PT_NEIGHBOURS_MOST))
         return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT, "patina_cloud_neighbourhoods: neighbours: 1 to %d, not %u",
                        PT_NEIGHBOURS_MOST, wanted->neighbours);
-    if ((error = pt_parts_refuse(cloud, "patina_cloud_neighbourhoods")) ||
-        (error = pt_whole_enter(cloud, "patina_cloud_neighbourhoods")))
+    if ((error = pt_undivided_enter(cloud, "patina_cloud_neighbourhoods")))
         return error;
     struct reading reading = {.cloud = cloud, .wanted = wanted, .progress = progress};
     struct pt_pool *pool = pt_pool_create(wanted->threads, 0);

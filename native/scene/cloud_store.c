@@ -632,8 +632,6 @@ int patina_cloud_verify(const char *path, patina_progress *progress)
 
 // ---- open, all of it ---------------------------------------------------------------------------------------------------
 
-#define FARTHEST_OFFSET 1e30
-
 static int open_cloud(const char *path, const double *offset, patina_cloud **out)
 {
     *out = NULL;
@@ -658,6 +656,8 @@ int patina_cloud_open(const char *path, patina_cloud **out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_open: bad arguments");
     return open_cloud(path, NULL, out);
 }
+
+#define FARTHEST_OFFSET 1e30
 
 int patina_cloud_open_at(const char *path, const double *offset, patina_cloud **out)
 {

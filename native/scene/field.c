@@ -10,7 +10,6 @@
 #include "base/pool.h"
 #include "fingerprint.h"
 #include "paged.h"
-#include "parts.h"
 #include "base/elementary.h"
 
 #include <float.h>
@@ -282,8 +281,7 @@ int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: cloud or out is NULL, or the cloud destroyed");
     *out = NULL;
     int error = pt_take(NULL, "patina_field_create", desc, &checked, sizeof checked);
-    error = error ? error : pt_parts_refuse(cloud, "patina_field_create");
-    if (error || (error = pt_whole_enter(cloud, "patina_field_create")))
+    if (error || (error = pt_undivided_enter(cloud, "patina_field_create")))
         return error;
     error = make_field(cloud, &checked, progress, out);
     pt_paged_leave(cloud);

@@ -334,6 +334,12 @@ int pt_whole_enter(const struct patina_cloud *cloud, const char *call)
     return pt_fail(&cloud->handle, PATINA_ERROR_UNSUPPORTED, "%s: points of the cloud are not all there", call);
 }
 
+int pt_undivided_enter(const struct patina_cloud *cloud, const char *call)
+{
+    const int refused = pt_parts_refuse(cloud, call);
+    return refused ? refused : pt_whole_enter(cloud, call);
+}
+
 // ---- what plans want ---------------------------------------------------------------------------------------------------
 
 static float float_of(uint32_t bits)

@@ -19,6 +19,8 @@ int pt_paged_whole(const struct patina_cloud *cloud);
 int pt_paged_refuse(const struct patina_cloud *cloud, const char *call);
 // Around calls that go over all points of a cloud: refuses clouds whose points are on their way. pt_paged_leave ends it, where it gave 0.
 int pt_whole_enter(const struct patina_cloud *cloud, const char *call);
+// The same around calls that take no cloud in parts (parts.h) yet.
+int pt_undivided_enter(const struct patina_cloud *cloud, const char *call);
 
 // Around all that reads chunks beside other pictures. enter: takes in the pages that arrived, if `renew` and nobody else is within.
 void pt_paged_enter(const struct patina_cloud *cloud, int renew);

@@ -4,7 +4,6 @@
 #include "base/platform.h"
 #include "mask.h"
 #include "paged.h"
-#include "parts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -148,8 +147,7 @@ int patina_scans_create(const patina_cloud *cloud, const uint16_t *scan, const p
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_scans_create: out is NULL");
     *out = NULL;
     int error = check(cloud, scans, count);
-    error = error ? error : pt_parts_refuse(cloud, "patina_scans_create");
-    if (error || (error = pt_whole_enter(cloud, "patina_scans_create")))
+    if (error || (error = pt_undivided_enter(cloud, "patina_scans_create")))
         return error;
     error = make_scans(cloud, scan, scans, count, out);
     pt_paged_leave(cloud);

@@ -306,8 +306,7 @@ PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
 // graded, and given colours and scalars like any; patina_cloud_analyse, patina_cloud_neighbourhoods, scans and fields refuse it
 // (PATINA_ERROR_TOO_MANY_POINTS) and change nothing.
 PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
-// The same, with an offset added to every position, in float64: of a survey at 5,000,000 m, for one, that whose coordinates are wanted near
-// zero. No point is read or written for it. offset: 3 numbers of at most 1e30.
+// The same, with an offset (3 numbers of at most 1e30) added to every position, in float64. No point is read or written for it.
 PATINA_API int patina_cloud_open_at(const char *path, const double *offset, patina_cloud **out);
 // Reads a saved cloud whole and compares the sum of each of its sections with that of the writing, which opening leaves out but
 // for the chunks: PATINA_ERROR_FORMAT where any differs. progress: may be NULL; stops it too. Any thread, open clouds or not.
