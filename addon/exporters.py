@@ -1,17 +1,61 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points → files, with the origin added back in float64. PLY (binary, little endian) and LAS 1.2. Knows no Blender."""
+"""Writes points to files, with the origin added back in float64: PLY (binary, little endian), LAS 1.2, LAZ and E57. Does not import bpy.
+
+LAZ needs the packages laspy and lazrs, E57 needs pye57 (readers.py installs them).
+"""
 
 from __future__ import annotations
 
 import math
+import os
 import struct
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from . import readers
 from .importers.scans import Scan
+
+# The packages that each format needs, by the extension of its files.
+NEEDS = {"ply": (), "las": (), "laz": ("laspy", "lazrs"), "e57": ("pye57", "pyquaternion")}
+_LAZ_PIECE = 1_000_000  # points that are compressed at a time: 34 MB of records
+
+
+class ExportError(Exception):
+    """The text is for the artist: what cannot be written, and what to do."""
+
+
+def extension_of(path: Path) -> str:
+    """The format that a file name stands for, "" if it has no extension. ExportError if the extension is not one of NEEDS."""
+    extension = path.suffix.lower()[1:]
+    if path.name.lower().endswith(".copc.laz"):
+        raise ExportError(f"'{path.name}': COPC files cannot be written. Export .laz and convert it, for example with untwine")
+    if extension and extension not in NEEDS:
+        raise ExportError(f"'{path.name}': points cannot be written as .{extension}. Use {', '.join('.' + name for name in NEEDS)}")
+    return extension
+
+
+def write(path: Path, points: Points, gps_time_start: float = 0.0) -> list[str]:
+    """Writes the format that the file name stands for. Returns the names of columns that the format has no place for.
+
+    The file appears once it is complete: a file of this name stays as it is if writing fails. Raises ExportError if a package is
+    missing, OSError if the file cannot be written. gps_time_start is added to the scalar gps_time of LAS and LAZ, in seconds."""
+    extension = extension_of(path)
+    missing = [name for name in NEEDS[extension] if readers.lacks(name)]
+    if missing:
+        raise ExportError(f"'{path.name}': {extension.upper()} needs the Python package {' and '.join(missing)}. "
+                          "Use Install Readers in the add-on's preferences")
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".patina-export-") as folder:
+        part = Path(folder) / f"points.{extension}"
+        try:
+            left = _WRITERS[extension](part, points, gps_time_start)
+        except RuntimeError as error:  # of libE57 and lazrs, a full disk for example
+            raise ExportError(f"'{path.name}' cannot be written: {error}") from None
+        os.replace(part, path)
+    return left
 
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
@@ -53,7 +97,8 @@ def _by_scan(points: Points) -> Points:
                    scalars={name: values[order] for name, values in points.scalars.items()})
 
 
-def write_ply(path: Path, points: Points) -> None:
+def write_ply(path: Path, points: Points) -> list[str]:
+    """Positions as float64, normals and scalars as float32. Every column has a place."""
     points = _by_scan(points)
     columns = [(axis, "f8", points.positions[:, i]) for i, axis in enumerate("xyz")]
     if points.normals is not None:
@@ -69,6 +114,7 @@ def write_ply(path: Path, points: Points) -> None:
     with open(path, "wb") as file:
         file.write("\n".join([*header, "end_header", ""]).encode())
         rows.tofile(file)
+    return []
 
 
 # Scalars that a LAS record has a place for, with what fits.
@@ -114,6 +160,53 @@ def write_las(path: Path, points: Points, gps_time_start: float = 0.0) -> list[s
     return sorted(left)
 
 
+def write_laz(path: Path, points: Points, gps_time_start: float = 0.0) -> list[str]:
+    """The records of write_las, compressed. Takes the room of the LAS file beside it meanwhile."""
+    readers.load("laspy", "lazrs")
+    import laspy
+    plain = path.with_suffix(".las")
+    left = write_las(plain, points, gps_time_start)
+    with laspy.open(plain) as source, laspy.open(path, mode="w", header=source.header, do_compress=True,
+                                                 laz_backend=laspy.LazBackend.Lazrs) as target:
+        for piece in source.chunk_iterator(_LAZ_PIECE):
+            target.write_points(piece)
+    plain.unlink()
+    return left
+
+
+def write_e57(path: Path, points: Points) -> list[str]:
+    """Writes each scan as a scan of the E57 file, or one scan if the points have none. Returns the names of columns that are left out.
+
+    Each scan's coordinates are float32, relative to its station or to the corner of its box: within 1 mm up to 16 km from there."""
+    readers.load("pye57")
+    import pye57
+    points = _by_scan(points)
+    of = points.scalars.get("scan") if points.scans else None
+    file = pye57.E57(str(path), mode="w")
+    try:
+        for index in range(len(points.scans) if of is not None else 1):
+            rows = np.flatnonzero(of == index) if of is not None else np.arange(len(points.positions))
+            if len(rows):
+                _write_e57_scan(file, points, rows, index)
+    finally:
+        file.close()
+    left = set(points.scalars) - {"intensity"} - ({"scan"} if of is not None else set())
+    return sorted([*left, *(["normals"] if points.normals is not None else [])])
+
+
+def _write_e57_scan(file: object, points: Points, rows: np.ndarray, index: int) -> None:
+    positions = points.positions[rows]
+    station = points.stations[index] if points.stations is not None and index < len(points.stations) else (math.nan,) * 3
+    center = np.array(station, np.float64) if all(map(math.isfinite, station)) else np.floor(positions.min(axis=0))
+    columns = {f"cartesian{axis}": (positions[:, i] - center[i]).astype(np.float32).astype(np.float64) for i, axis in enumerate("XYZ")}
+    if points.colors is not None:
+        columns |= {f"color{name}": points.colors[rows, i] for i, name in enumerate(("Red", "Green", "Blue"))}
+    if "intensity" in points.scalars:
+        columns["intensity"] = np.nan_to_num(points.scalars["intensity"][rows])
+    name = points.scans[index].name if index < len(points.scans) else ""
+    file.write_scan_raw(columns, name=name or f"Scan {index + 1}", rotation=np.array([1.0, 0.0, 0.0, 0.0]), translation=center)
+
+
 def _las_header(count: int, crs: bytes, scale: Sequence[float], offset: Sequence[float], lower: Sequence[float],
                 upper: Sequence[float]) -> bytes:
     record = struct.pack("<H16sHH32s", 0, b"LASF_Projection", 2112, len(crs), b"WKT") + crs if crs else b""
@@ -121,3 +214,7 @@ def _las_header(count: int, crs: bytes, scale: Sequence[float], offset: Sequence
                        1, 227, 227 + len(record), 1 if crs else 0, 3, 34, count, count, 0, 0, 0, 0)
     box = [value for pair in zip(upper, lower, strict=True) for value in pair]
     return head + struct.pack("<12d", *scale, *offset, *box) + record
+
+
+_WRITERS = {"ply": lambda path, points, _start: write_ply(path, points), "las": write_las, "laz": write_laz,
+            "e57": lambda path, points, _start: write_e57(path, points)}

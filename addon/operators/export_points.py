@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""File > Export > Point Cloud: PLY and LAS, in the coordinates that the points came from."""
+"""File > Export > Point Cloud: PLY, LAS, LAZ and E57, in the coordinates that the points came from."""
 
 from __future__ import annotations
 
@@ -30,14 +30,19 @@ class PATINA_OT_export_points(Operator, ExportHelper):
     kind: EnumProperty(
         name="Format", default='PLY',
         items=(('PLY', "PLY", "Binary, with all scalars and float64 positions", 0),
-               ('LAS', "LAS", "LAS 1.2, point format 3; the scalars that it has a place for", 1)))
+               ('LAS', "LAS", "LAS 1.2, point format 3, with the scalars that LAS has a place for", 1),
+               ('LAZ', "LAZ", "LAS 1.2, compressed. Needs the packages laspy and lazrs", 2),
+               ('E57', "E57", "A scan of the file for each scan, with colors and intensity. Needs the package pye57", 3)))
     selected: BoolProperty(name="Selected Only", default=True, description="Leave out objects that are not selected")
-    filter_glob: StringProperty(default="*.ply;*.las", options={'HIDDEN'})
+    overwrite: BoolProperty(name="Overwrite", default=False, options={'HIDDEN', 'SKIP_SAVE'},
+                            description="Replace a file of the same name. The file dialog asks by itself")
+    filter_glob: StringProperty(default=";".join(f"*.{name}" for name in exporters.NEEDS), options={'HIDDEN'})
     filename_ext = ""
     _seen = ""  # the format when the dialog last looked
 
     def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
         self._seen = self.kind
+        self.overwrite = True  # the file dialog marks a name that exists in red, and asks
         return super().invoke(context, event)
 
     def check(self, _context: Context) -> bool:
@@ -54,10 +59,11 @@ class PATINA_OT_export_points(Operator, ExportHelper):
         return True
 
     def execute(self, context: Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath))
-        if not self.properties.is_property_set("kind"):  # of a script
-            self.kind = _kind_of(path) or self.kind
-        path = path.with_suffix(f".{self.kind.lower()}")
+        try:
+            path = self._path()
+        except exporters.ExportError as error:
+            self.report({'ERROR'}, f"Patina: {error}")
+            return {'CANCELLED'}
         objects, solid = self._objects(context)
         parts = []
         try:
@@ -72,17 +78,30 @@ class PATINA_OT_export_points(Operator, ExportHelper):
                         else "Patina: no visible object has points")
             return {'CANCELLED'}
         try:
-            left = [] if self.kind == 'PLY' else exporters.write_las(path, points, _gps_start(objects))
-            if self.kind == 'PLY':
-                exporters.write_ply(path, points)
+            left = exporters.write(path, points, _gps_start(objects))
         except OSError as error:
             self.report({'ERROR'}, f"Patina: {path.name} cannot be written: {error.strerror}")
             return {'CANCELLED'}
+        except exporters.ExportError as error:
+            self.report({'ERROR'}, f"Patina: {error}")
+            return {'CANCELLED'}
         if left:
-            self.report({'WARNING'}, f"LAS has no place for {', '.join(left)}")
+            self.report({'WARNING'}, f"{path.suffix[1:].upper()} has no place for {', '.join(left)}")
         faces = f". Left out: {solid} mesh{'es' * (solid > 1)} with faces" if solid else ""
         self.report({'INFO'}, f"Exported {len(points.positions):,} points to {path.name}{faces}")
         return {'FINISHED'}
+
+    def _path(self) -> Path:
+        """The file to write. ExportError if name and format disagree, or if the file exists and must stay."""
+        path = Path(bpy.path.abspath(self.filepath))
+        named = exporters.extension_of(path)
+        if not named:
+            path = path.with_suffix(f".{self.kind.lower()}")
+        elif self.properties.is_property_set("kind") and named != self.kind.lower():
+            raise exporters.ExportError(f"'{path.name}' does not fit the format {self.kind}. Name the file .{self.kind.lower()}, or leave the format out")
+        if path.exists() and not self.overwrite:
+            raise exporters.ExportError(f"'{path}' exists. Choose another name, or set overwrite=True")
+        return path
 
     def _objects(self, context: Context) -> tuple[list[bpy.types.Object], int]:
         """Evaluated, and how many were left out: faces' corners are no scan, unless there is nothing else."""
@@ -94,8 +113,9 @@ class PATINA_OT_export_points(Operator, ExportHelper):
 
 
 def _kind_of(path: Path) -> str:
-    """What a name says, or nothing."""
-    return {".ply": 'PLY', ".las": 'LAS'}.get(path.suffix.lower(), "")
+    """The format that a name stands for, or ""."""
+    kind = path.suffix[1:].upper()
+    return kind if kind.lower() in exporters.NEEDS else ""
 
 
 def _gps_start(objects: list[bpy.types.Object]) -> float:
@@ -244,7 +264,7 @@ def _join(parts: list[exporters.Points]) -> exporters.Points | None:
 
 
 def _menu(self: bpy.types.Menu, _context: Context) -> None:
-    self.layout.operator(PATINA_OT_export_points.bl_idname, text="Point Cloud (.ply/.las)")
+    self.layout.operator(PATINA_OT_export_points.bl_idname, text="Point Cloud (.ply/.las/.laz/.e57)")
 
 
 def register() -> None:

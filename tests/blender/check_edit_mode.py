@@ -80,7 +80,7 @@ def test_export_and_framing():
     path = SCRATCH / "edited.ply"
     edit(points)
     try:
-        bpy.ops.export_scene.patina_points(filepath=str(path), kind='PLY')
+        bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(path), kind='PLY')
         file = library.read(path, patina.importers.Filter(), patina.importers.Progress())
         check(len(file.positions) == 2000 and file.colors is not None and file.normals is not None, "the exported file")
         check(bpy.ops.object.patina_frame_points() == {'FINISHED'}, "framing")

@@ -227,7 +227,7 @@ def test_export_and_conversion():
     bpy.ops.object.patina_points_hide()
     obj.select_set(True)
     path = SCRATCH / "exported.ply"
-    bpy.ops.export_scene.patina_points(filepath=str(path))
+    bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(path))
     file = library.read(path, patina.importers.Filter(), patina.importers.Progress())
     source = library.read(SCRATCH / "export.ply", patina.importers.Filter(), patina.importers.Progress())
     left = source.scalars["classification"] == 2

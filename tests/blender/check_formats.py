@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Point files of many kinds in, PLY and LAS out: what is kept, what is refused and how."""
+"""Point files of many kinds in, PLY, LAS, LAZ and E57 out: what is kept, what is refused and how."""
 
+import contextlib
 import os
 import struct
 import sys
@@ -13,7 +14,7 @@ import numpy as np
 from check_import import attribute_of, positions_of
 from check_import import import_ply as import_points
 from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, drawn, new_scene, render
-from patina import importers, native
+from patina import exporters, importers, native, readers
 from patina.importers import e57, las, pcd, reading, scans
 
 DATA = REPOSITORY.parent / "shared/data"
@@ -41,7 +42,7 @@ def text_file(name, text):
 
 
 def export(path, kind):
-    bpy.ops.export_scene.patina_points(filepath=str(path), kind=kind)
+    bpy.ops.export_scene.patina_points(filepath=str(path), kind=kind, overwrite=True)
 
 
 def fails(path, part, **options):
@@ -109,7 +110,11 @@ def test_las_round_trip():
     bpy.context.scene.collection.objects.link(obj)
     obj.select_set(True)
     kept = points.positions.astype(np.float64) + points.origin
-    for kind, tolerance in (("las", 6e-5), ("ply", 1e-9)):
+    kinds = [("las", 6e-5), ("ply", 1e-9)]
+    with contextlib.suppress(Skip):
+        with_laspy()
+        kinds.append(("laz", 6e-5))
+    for kind, tolerance in kinds:
         path = SCRATCH / f"trip.{kind}"
         export(path, kind.upper())
         back = importers.reader(path).read(path, importers.Filter(), importers.Progress())
@@ -130,10 +135,10 @@ def test_export_by_name():
     new_scene()
     add_points(np.zeros((7, 3))).select_set(True)
     for name, options, made in (("named.las", {}, "named.las"), ("named.ply", {}, "named.ply"), ("plain", {}, "plain.ply"),
-                                ("other.las", {"kind": 'PLY'}, "other.ply")):
+                                ("again.LAS", {"kind": 'LAS'}, "again.LAS")):
         bpy.ops.export_scene.patina_points(filepath=str(SCRATCH / name), **options)
         path = SCRATCH / made
-        check(path.read_bytes()[:4] == (b"LASF" if made.endswith("las") else b"ply\n"), f"{name}: {made}")
+        check(path.read_bytes()[:4] == (b"LASF" if made.lower().endswith("las") else b"ply\n"), f"{name}: {made}")
         path.unlink()
     from patina.operators.export_points import PATINA_OT_export_points as export_points
     dialog = SimpleNamespace(kind='PLY', _seen='PLY', filepath="/a/scan.ply")
@@ -143,6 +148,58 @@ def test_export_by_name():
         export_points.check(dialog, None)
         check((dialog.kind, dialog.filepath) == (kind, f"/a/{name}"), f"{change}: {dialog}")
         check(not export_points.check(dialog, None), f"{change}: it goes on and on")
+
+
+def test_export_never_writes_another_format():
+    """A script that names a format which cannot be written, or a file that exists, gets an error, and no file changes."""
+    new_scene()
+    add_points(np.zeros((7, 3))).select_set(True)
+    there = SCRATCH / "there.ply"
+    there.write_bytes(b"kept")
+    needs = exporters.NEEDS
+    exporters.NEEDS = {**needs, "e57": ("no_such_package",)}
+    lacks, readers.lacks = readers.lacks, lambda *names: "no_such_package" in names
+    try:
+        for name, options, text in (("scan.xyz", {}, "points cannot be written as .xyz"), ("scan.copc.laz", {}, "COPC files cannot be written"),
+                                    ("scan.las", {"kind": 'PLY'}, "does not fit the format PLY"), ("there.ply", {}, "exists"),
+                                    ("there", {}, "exists"), ("there.e57", {}, "no_such_package")):
+            try:
+                bpy.ops.export_scene.patina_points(filepath=str(SCRATCH / name), **options)
+            except RuntimeError as error:
+                check(text in str(error), f"{name}: {error}")
+            else:
+                check(False, f"{name} was written")
+            check(name == "there.ply" or not (SCRATCH / name).exists(), f"{name} is there")
+    finally:
+        exporters.NEEDS, readers.lacks = needs, lacks
+    check(there.read_bytes() == b"kept", "the file that existed was overwritten")
+    check(not list(SCRATCH.glob(".patina-export-*")), "a temporary folder stayed")
+    there.unlink()
+
+
+def test_e57_round_trip():
+    """What is exported as E57 comes back: scans with their stations, positions, colors and intensity."""
+    try:
+        import pye57  # noqa: F401
+    except ImportError:
+        raise Skip("pye57 is not installed here") from None
+    rng = np.random.default_rng(5)
+    origin = np.array((5000000.0, 4000000.0, 200.0))
+    positions = origin + rng.uniform(-20, 20, (500, 3))
+    colors = rng.integers(0, 256, (500, 3)).astype(np.uint8)
+    scalars = {"intensity": rng.uniform(0, 1, 500).astype(np.float32), "scan": (np.arange(500) % 2).astype(np.float32)}
+    pose = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    two = [scans.Scan(f"Station {i}", 250, scans.UNKNOWN, 0.0, pose, (0, 0)) for i in range(2)]
+    stations = np.stack([origin, origin + (3.5, -2.0, 1.0)])
+    path = SCRATCH / "trip.e57"
+    left = exporters.write(path, exporters.Points(positions, None, colors, scalars, scans=two, stations=stations))
+    check(left == [], f"left out: {left}")
+    back = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+    order = np.argsort(scalars["scan"], kind="stable")
+    check_close(back.positions.astype(np.float64) + back.origin, positions[order], 1e-5, "positions")
+    check_close(back.colors[:, :3], colors[order], 0, "colors")
+    check_close(back.scalars["intensity"], scalars["intensity"][order], 1e-6, "intensity")
+    check_close(np.array(back.notes["scanners"]).reshape(-1, 3) + back.origin, stations, 1e-5, "stations")
 
 
 def test_export_leaves_faces_out():
@@ -155,7 +212,7 @@ def test_export_leaves_faces_out():
     faces.select_set(True)
     path = SCRATCH / "faces_out.ply"
     for count in (7, 3):
-        bpy.ops.export_scene.patina_points(filepath=str(path))
+        bpy.ops.export_scene.patina_points(filepath=str(path), overwrite=True)
         found = importers.reader(path).read(path, importers.Filter(), importers.Progress())
         check(len(found.positions) == count, f"{len(found.positions)} points, not {count}")
         bpy.data.objects["points"].select_set(False)

@@ -231,7 +231,7 @@ def test_reading_in_steps():
     check(kinds == ["Task"] * 4, f"PLY: {kinds}")  # open, build, analyze, save
     import_ply(path)
     points = SCRATCH / "steps.las"
-    bpy.ops.export_scene.patina_points(filepath=str(points), kind='LAS')
+    bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(points), kind='LAS')
     piece, las.SMALL_PIECE = las.SMALL_PIECE, 10000
     try:
         kinds = [type(step).__name__ for step in linked.steps(linked.source(points), patina.importers.Progress())]

@@ -142,12 +142,12 @@ def test_feet_become_metres():
             check_close(places - places[0], wanted, 2e-3, f"{name}: in metres")
             check_close(places + np.array(scene["patina_origin"]), feet * crs.US_FOOT, 2e-3, f"{name}: in the world")
             back = SCRATCH / "feet_back.ply"
-            bpy.ops.export_scene.patina_points(filepath=str(back), kind='PLY')
+            bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(back), kind='PLY')
             points = library.read(back, Filter(), Progress())
             check_close(points.positions.astype(np.float64) + points.origin, feet, 2e-3, f"{name}: written as it came")
             obj.location.x += 10.0
             bpy.context.view_layer.update()
-            bpy.ops.export_scene.patina_points(filepath=str(back), kind='PLY')
+            bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(back), kind='PLY')
             points = library.read(back, Filter(), Progress())
             check_close(points.positions.astype(np.float64) + points.origin, feet + (10 / crs.US_FOOT, 0, 0), 3e-2, f"{name}: moved")
 

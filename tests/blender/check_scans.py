@@ -392,7 +392,7 @@ def test_stations_survive_linking():
     check(len(obj.children) == 2 and not bpy.ops.object.patina_add_stations.poll(), "its empties stay")
     obj.location.x = 100.0
     bpy.context.view_layer.update()
-    bpy.ops.export_scene.patina_points(filepath=str(SCRATCH / "moved.ply"))
+    bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(SCRATCH / "moved.ply"))
     for link in (False, True):
         before = set(bpy.data.objects)
         bpy.ops.import_scene.patina_points(filepath=str(SCRATCH / "moved.ply"), link=link)

@@ -155,7 +155,7 @@ def test_numbers_from_analysis_to_file():
 
     path = SCRATCH / "numbers.ply"
     obj.select_set(True)
-    check(bpy.ops.export_scene.patina_points(filepath=str(path), selected=True) == {'FINISHED'}, "exported")
+    check(bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(path), selected=True) == {'FINISHED'}, "exported")
     file = patina.native.File(str(path))
     check({"soft_radius", "uncertainty", "density"} <= set(file.attributes), f"{file.attributes}")
     bpy.data.objects.remove(obj)

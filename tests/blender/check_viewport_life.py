@@ -387,7 +387,7 @@ def test_a_changed_link_keeps_nobody_waiting():
     """A linked LAS that changed is read piece by piece; Blender goes on between them, the old picture stays."""
     source = import_points(dense("changed.ply", 60000, (0, 0, 0)))[0]
     path = SCRATCH / "changed.las"
-    bpy.ops.export_scene.patina_points(filepath=str(path), kind='LAS')
+    bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(path), kind='LAS')
     scene = setup()
     check(source is not None and scene, "a scene of its own")
     import_points(path, link=True)
@@ -418,7 +418,7 @@ def test_import_of_a_user():
     path = dense("user.ply", 60000, (0, 0, 0))
     import_points(path)
     las_path = SCRATCH / "user.las"
-    bpy.ops.export_scene.patina_points(filepath=str(las_path), kind='LAS')
+    bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(las_path), kind='LAS')
     piece, las.SMALL_PIECE = las.SMALL_PIECE, 300
     turns, modal = [], Import.modal
 
