@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From Blender's start scene to a picture of points: engine, camera and light, offered after the first import."""
+"""From Blender's start scene to a picture of points: engine, camera, look and light, offered after the first import."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mathutils import Vector
 
 from .. import native
 from ..engine import PatinaRenderEngine
-from . import analyze
+from . import analyze, first_look, stations
 
 START = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}  # what Blender begins with
 LEAST = 0.05  # W/m2 from a lamp that count as light; the start scene's gives a cube beside it 1.5
@@ -23,10 +23,16 @@ def is_points(obj: Object) -> bool:
 
 
 def untouched(scene: Scene) -> bool:
-    """Whether there is nothing but points, and what Blender's start scene holds."""
-    others = [obj for obj in scene.objects if not is_points(obj)]
+    """Whether there is nothing but points, what came with them, and what Blender's start scene holds."""
+    others = [obj for obj in scene.objects if not is_points(obj) and not _imported(obj)]
     return (not bpy.data.filepath and len(bpy.data.scenes) == 1 and "EEVEE" in scene.render.engine
             and all(START.get(obj.name) == obj.type for obj in others) and all(map(_as_it_came, others)))
+
+
+def _imported(obj: Object) -> bool:
+    """Whether an import added it beside the points: a station, or a camera at one."""
+    return obj.parent is not None and (is_points(obj.parent) or stations.PROPERTY in obj.parent) and obj.type in {'EMPTY', 'CAMERA'} \
+        and (obj.type == 'CAMERA' or stations.PROPERTY in obj)
 
 
 def _as_it_came(obj: Object) -> bool:
@@ -58,8 +64,9 @@ def _reaches(lamp: Object, corners: Sequence[Vector]) -> bool:
 
 
 class PATINA_OT_set_up(Operator):
-    """Render with Patina: leaves out the start scene's cube, aims the camera at the points and looks through it, and where no light \
-reaches them, turns on the headlight"""
+    """Render with Patina: deletes the start scene's cube, aims the camera at the points and looks through it. Colors are shown as they \
+were taken, intensity and classes as colors, points without any of these in the style Plaster. If no light reaches lit points, \
+the headlight is turned on"""
 
     bl_idname = "scene.patina_set_up"
     bl_label = "Set Up for Points"
@@ -81,6 +88,8 @@ reaches them, turns on the headlight"""
         if bpy.ops.object.patina_frame_points.poll():
             bpy.ops.object.patina_frame_points()
             _look_through_camera(context)
+        for text in first_look.choose(scene, points):
+            self.report({'INFO'}, text)
         if unlit(scene, points):
             scene.patina.studio.use_headlight = True
             self.report({'INFO'}, "No lamp reaches the points: the headlight shines from the camera, on those without colors of their own")

@@ -7,7 +7,7 @@ import numpy as np
 from check_import import columns, import_ply, write_ply
 from check_places import las_file
 from harness import SCRATCH, check, new_scene, render, sphere
-from patina.operators import set_up
+from patina.operators import set_up, stations
 
 
 def start_scene():
@@ -29,10 +29,14 @@ def test_set_up_after_the_first_import():
     check(set_up.unlit(scene, [obj]), "a lamp of a kilowatt does not reach")
     check(bpy.ops.scene.patina_set_up() == {'FINISHED'}, "set up")
     check(scene.render.engine == 'PATINA' and "Cube" not in bpy.data.objects, "engine and cube")
-    check(scene.patina.studio.use_headlight, "no headlight")
+    check(scene.patina.style.chosen == "plaster" and scene.patina.studio.use_light, "points without colors are lit as plaster")
     scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
     picture = render()["Combined"][..., :3].max(axis=2)
     check((picture > 0.2).mean() > 0.1, f"{(picture > 0.2).mean():.0%} of the picture is bright")
+    # the key light comes from the upper left
+    rows, columns = np.nonzero(picture > 0.5)
+    height, width = picture.shape
+    check(columns.mean() < 0.5 * width and rows.mean() > 0.5 * height, f"bright about {columns.mean():.0f}, {rows.mean():.0f} of {width} x {height}")
 
 
 def test_set_up_lights_linked_scans():
@@ -40,7 +44,7 @@ def test_set_up_lights_linked_scans():
     scene = start_scene()
     obj, = import_ply(gray("linked_gray.ply", 100.0), link=True)
     check(set_up.unlit(scene, [obj]), "a lamp of a kilowatt does not reach")
-    check(bpy.ops.scene.patina_set_up() == {'FINISHED'} and scene.patina.studio.use_headlight, "no headlight")
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'} and scene.patina.style.chosen == "plaster", "no plaster")
     scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
     picture = render()["Combined"][..., :3].max(axis=2)
     check((picture > 0.2).mean() > 0.1, f"{(picture > 0.2).mean():.0%} of the picture is bright")
@@ -65,6 +69,7 @@ def test_strays_keep_no_light_away():
         check(not set_up.unlit(scene, [obj]), f"{count} points: the lamp reaches them")
         bpy.ops.scene.patina_set_up()
         check(not scene.patina.studio.use_headlight, f"{count} points: a headlight that nobody needs")
+        scene.patina.studio.use_light = False  # of the style Plaster, which Set Up chose
         obj.matrix_world.translation = (400, 0, 0)
         bpy.context.view_layer.update()
         check(set_up.unlit(scene, [obj]), "far from the lamp")
@@ -86,6 +91,66 @@ def test_ramps_of_coloured_surveys_are_lit():
     obj.patina.colors.source = 'HEIGHT'
     ramp = render()["Combined"][..., :3].max(axis=2)
     check((ramp[shown] > 0.1).mean() > 0.8, f"{(ramp[shown] > 0.1).mean():.0%} of the points are bright")
+
+
+def columns_of(scale, **scalars):
+    points, _, _ = sphere(5000, scale, (0, 0, 0))
+    return [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")] + [(name, "f4", values(points)) for name, values in scalars.items()]
+
+
+def test_first_look_of_intensity():
+    """Points with intensity alone: gray, stretched between the 1st and 99th percentile, so that strays do not flatten it."""
+    scene = start_scene()
+    obj, = import_ply(write_ply("first_intensity.ply", columns_of(1.0, intensity=lambda points: np.where(np.arange(len(points)) % 500, 1000 + 100 * points[:, 2], 60000))))
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'}, "set up")
+    colors = obj.patina.colors
+    check((colors.source, colors.scalar, colors.ramp, obj.patina.lighting) == ('SCALAR', "intensity", 'GREY', 'UNLIT'), f"{colors.source} {colors.ramp}")
+    check(900 <= colors.range_min < 905 and 1095 < colors.range_max <= 1100 and colors.use_range, f"{colors.range_min} to {colors.range_max}")
+    check(scene.view_settings.view_transform == 'Standard', scene.view_settings.view_transform)
+    scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
+    picture = render()["Combined"]
+    shown = picture[..., 3] > 0.99
+    check(np.ptp(picture[..., 0][shown]) > 0.8, f"gray from {picture[..., 0][shown].min():.2f} to {picture[..., 0][shown].max():.2f}")
+
+
+def test_first_look_of_classes():
+    start_scene()
+    obj, = import_ply(write_ply("first_classes.ply", columns_of(1.0, classification=lambda points: np.where(points[:, 2] > 0, 5, 2))))
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'}, "set up")
+    colors = obj.patina.colors
+    check((colors.source, colors.scalar, colors.ramp) == ('SCALAR', "classification", 'CLASSES'), f"{colors.source} {colors.scalar} {colors.ramp}")
+
+
+def test_first_look_leaves_what_was_chosen():
+    """A color source that the artist chose stays, and colors stay as they were taken."""
+    scene = start_scene()
+    obj, = import_ply(write_ply("first_chosen.ply", columns_of(1.0, intensity=lambda points: points[:, 2])))
+    obj.patina.colors.source = 'HEIGHT'
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'} and obj.patina.colors.source == 'HEIGHT', obj.patina.colors.source)
+    scene = start_scene()
+    obj, = import_ply(write_ply("first_colored.ply", columns((0, 0, 0))))
+    scene.view_settings.view_transform = 'Filmic' if bpy.app.version < (4, 0, 0) else 'AgX'
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'}, "set up")
+    check(scene.view_settings.view_transform == 'Standard', scene.view_settings.view_transform)
+    check(obj.patina.colors.source == 'OWN' and scene.patina.style.chosen == "scan", f"{obj.patina.colors.source}, {scene.patina.style.chosen}")
+
+
+def test_stations_are_no_touch():
+    """What an import brings with the points leaves the scene untouched: Set Up is offered, and deletes the cube."""
+    scene = start_scene()
+    obj, = import_ply(gray("with_stations.ply", 10.0))
+    empty = bpy.data.objects.new("station", None)
+    empty[stations.PROPERTY], empty.parent = 0, obj
+    camera = bpy.data.objects.new("panorama", bpy.data.cameras.new("panorama"))
+    camera.parent = empty
+    for added in (empty, camera):
+        scene.collection.objects.link(added)
+    check(set_up.untouched(scene), "stations and their cameras are no touch")
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'} and "Cube" not in bpy.data.objects, "the cube is still there")
+    scene = start_scene()
+    import_ply(gray("with_empty.ply", 10.0))
+    scene.collection.objects.link(bpy.data.objects.new("the artist's", None))
+    check(not set_up.untouched(scene), "an empty of the artist's is a touch")
 
 
 def test_set_up_is_not_offered_twice():

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Chooses the first look of points by the data that they have: colors, intensity, classes, or positions alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+
+import bpy
+import numpy as np
+from bpy.types import Object, Scene
+
+from .. import jobs, native
+from ..sync import attributes, linked
+from . import view_transform
+
+PLASTER = "plaster"  # the style of points that have positions alone
+INTENSITY = ("intensity", "reflectance", "amplitude", "grey", "gray", "scalar_intensity")  # names in lower case, the first found counts
+SHARE = 0.01  # of the points that the stretch of intensity leaves out at either end
+
+
+class Data(Enum):
+    """The best that an object's points can be colored by."""
+
+    COLORS = "colors"
+    INTENSITY = "intensity"
+    CLASSES = "classes"
+    POSITIONS = "positions"
+
+
+def data_of(obj: Object, frame: int) -> Data:
+    """What the points of an object have. Linked files are asked for colors alone. PatinaError if a linked file cannot be read."""
+    if obj.patina.linked_file:
+        source = linked.source_of(obj, frame, [])
+        found = source and jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
+        return Data.COLORS if not found or found.has_colors else Data.POSITIONS
+    with attributes.readable(obj) as data:
+        count = len(data.vertices if obj.type == 'MESH' else data.points)
+        rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
+        if rgb is not None and attributes.colored(rgb).any():
+            return Data.COLORS
+        if _intensity(obj):
+            return Data.INTENSITY
+        classes = attributes.classes(data, count, obj.patina.colors.class_attribute) if count else None
+        return Data.CLASSES if classes is not None and classes.any() else Data.POSITIONS
+
+
+def choose(scene: Scene, points: Sequence[Object]) -> list[str]:
+    """Sets the look of points whose look nobody has chosen yet. Returns what was done, in sentences without full stops.
+
+    Colors are shown unlit and as they were taken. Intensity is stretched between its 1st and 99th percentile. Classes get the LAS
+    colors. If no object has any of these, the scene gets the style Plaster."""
+    kinds = {obj: _data(obj, scene.frame_current) for obj in points if obj.patina.colors.source == 'OWN'}
+    said = []
+    if kinds and all(kind == Data.POSITIONS for kind in kinds.values()):
+        scene.patina.style.chosen = PLASTER
+        return ["The points have no colors: the style Plaster lights them"]
+    for obj, kind in kinds.items():
+        if kind == Data.INTENSITY:
+            said.append(_show_intensity(obj))
+        elif kind == Data.CLASSES:
+            _show_scalar(obj, next(name for name in attributes.CLASS_NAMES if name in obj.data.attributes), 'CLASSES')
+            said.append(f"'{obj.name}' is colored by its classes")
+    if any(kind != Data.POSITIONS for kind in kinds.values()) and view_transform.changes_colors(scene):
+        bpy.ops.render.patina_true_colors()
+        said.append("The view transform is Standard, which shows the colors as they were taken")
+    return said
+
+
+def _data(obj: Object, frame: int) -> Data:
+    try:
+        return data_of(obj, frame)
+    except native.PatinaError:
+        return Data.COLORS  # the viewport reports the file
+
+
+def _intensity(obj: Object) -> str:
+    """The attribute that holds how bright the scanner saw the points; "": none."""
+    names = {attribute.name.lower(): attribute.name for attribute in obj.data.attributes if attribute.data_type in {'FLOAT', 'INT', 'INT8'}}
+    return next((names[name] for name in INTENSITY if name in names), "")
+
+
+def _show_intensity(obj: Object) -> str:
+    name = _intensity(obj)
+    _show_scalar(obj, name, 'GREY')
+    values = attributes.scalars(obj.data, len(obj.data.attributes[name].data), name)
+    values = values[np.isfinite(values)] if values is not None else np.empty(0)
+    group = obj.patina.colors
+    if len(values) and values.min() < values.max():
+        low, high = (float(value) for value in np.quantile(values, (SHARE, 1.0 - SHARE)))
+        group.range_min, group.range_max = (low, high) if low < high else (float(values.min()), float(values.max()))
+        group.use_range = True
+    return f"'{obj.name}' is colored by '{name}'"
+
+
+def _show_scalar(obj: Object, name: str, ramp: str) -> None:
+    group = obj.patina.colors
+    group.scalar, group.source, group.ramp = name, 'SCALAR', ramp
+    if obj.patina.lighting == 'AUTO':
+        obj.patina.lighting = 'UNLIT'
