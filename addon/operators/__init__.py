@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from . import (
+    add_light,
     addresses,
     analyze,
     balance,
@@ -30,8 +31,8 @@ from . import (
     world,
 )
 
-_MODULES = (analyze, balance, clips, colors, import_points, addresses, export_points, combine, farm, linked_points, plan, points, points_keys, points_tools, preferences,
-            scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
+_MODULES = (add_light, analyze, balance, clips, colors, import_points, addresses, export_points, combine, farm, linked_points, plan, points,
+            points_keys, points_tools, preferences, scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
 
 
 def register() -> None:

@@ -123,7 +123,7 @@ class PATINA_OT_scans_reset(OfScans, Operator):
 
 
 class PATINA_OT_scans_color(OfScans, Operator):
-    """Color each point by the scan that it is of, by a ramp; Color: Attribute brings the points' own colors back"""
+    """Color each point by its scan. Needs points of two scans or more. Set Color to Own Colors to undo it"""
 
     bl_idname = "object.patina_scans_color"
     bl_label = "Color by Scan"
@@ -131,7 +131,7 @@ class PATINA_OT_scans_color(OfScans, Operator):
     def change(self, context: Context, obj: Object) -> set[str]:
         found, _ = known(obj, context)
         if not found:
-            self.report({'ERROR'}, f"Patina: '{obj.name}': the file does not say which scans its points are of")
+            self.report({'ERROR'}, f"Patina: '{obj.name}' has one scan only, or its file does not name the scan of each point")
             return {'CANCELLED'}
         group = obj.patina.colors
         group.scalar, group.source, group.ramp, group.use_range = found.name, 'SCALAR', 'SPECTRUM', False

@@ -15,8 +15,7 @@ _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 class PatinaSoftProperties(PropertyGroup):
     use: BoolProperty(
         name="Soft Points", override=_OVERRIDE, default=False,
-        description="Points are balls of density that the eye sees into, instead of surface: all of them, or those that a number of theirs "
-                    "says. They throw no shadow and take none")
+        description="Draw points as balls of density instead of a surface: all points, or those chosen below. They cast and receive shadows")
     styled: BoolProperty(override=_OVERRIDE, default=False, options={'HIDDEN'})  # by a style: the next one undoes it
     by: EnumProperty(
         name="Soft", override=_OVERRIDE, default='ALL',

@@ -85,13 +85,15 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
     replaced = studio.use_light and studio.use_background  # then nothing of the world is drawn
     around = world.read(None if replaced else scene.world, notices)
     read = settings.read(scene, view, around)
+    found_lights, headlight = lights.collect(depsgraph, notices, around.spot), lights.headlight(scene, view, notices)
+    notices += filter(None, [lights.notice(points, lights.missing(found_lights, headlight, around))])
     behind = around if around.behind and not (read.film_transparent or studio.use_background) else None
     return SceneDescription(
         clouds=points,
         meshes=[item for item in items if isinstance(item, MeshItem)],
         clips=clips.collect(depsgraph, notices),
-        lights=lights.collect(depsgraph, notices, around.spot),
-        headlight=lights.headlight(scene, view, notices),
+        lights=found_lights,
+        headlight=headlight,
         lines=lines.read(scene, view.camera),
         camera=view.camera,
         panorama=view.panorama,

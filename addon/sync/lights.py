@@ -4,16 +4,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import bpy
 from mathutils import Matrix, Vector
 
 from . import losses
 from .camera import Camera, View
-from .world import Spot
+from .world import Spot, World
+
+if TYPE_CHECKING:
+    from .clouds import CloudItem
 
 TYPES = {'SUN': 1, 'POINT': 2, 'SPOT': 3, 'AREA': 4}  # patina_light_type
+LIT = 2  # PATINA_LIGHTING_LIT
 MOST = 32  # lights of a scene in the library
 # Of an area light's power Cycles radiates pi / 4 in Blender 3.4, all of it in 4.2, 4.5 and 5.0: measured.
 AREA_SHARE = math.pi / 4 if bpy.app.version < (4, 2, 0) else 1.0
@@ -59,6 +65,17 @@ def headlight(scene: bpy.types.Scene, view: View, notices: list[str]) -> Headlig
         notices.append("the headlight is off: a panorama looks everywhere")
         return None
     return Headlight((1.0, 1.0, 1.0), studio.headlight)
+
+
+def missing(lights: Sequence[Light], headlight: Headlight | None, world: World) -> bool:
+    """Whether lit points are black: there is no light, and the world is black."""
+    return not lights and headlight is None and not any(world.color) and not any(world.light) and not any(world.plain_light or ())
+
+
+def notice(items: Sequence[CloudItem], dark: bool) -> str:
+    """What the artist reads if points are Lit and no light reaches them; "": all is well."""
+    names = [f"'{item.name}'" for item in items if dark and item.style.lighting == LIT]
+    return f"no light reaches {', '.join(names)}: use Add Light in the Points panel, or set Lighting to Unlit" if names else ""
 
 
 def collect(depsgraph: bpy.types.Depsgraph, notices: list[str], spot: Spot | None = None) -> list[Light]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
+from ..operators import add_light
 from ..operators.clips import PATINA_OT_add_clip_box, PATINA_OT_add_clip_plane
 from . import rows
 from .panels import PatinaPanel
@@ -44,6 +45,9 @@ class _FirstLines:
             column.prop(colors, "ramp")
         layout.prop(patina, "opacity")
         layout.prop(patina, "lighting")
+        if patina.lighting == 'LIT' and add_light.is_dark(context.scene):
+            rows.sentence(context, layout, "No light reaches this cloud", 'ERROR')
+            layout.operator(add_light.PATINA_OT_add_light.bl_idname, icon='LIGHT_SUN')
         rows.automatic(layout, patina, "radius").active = context.scene.patina.surface in {'AUTO', 'SPLATS'} and not patina.ranges.use
         row = layout.row(heading="Clip", align=True)
         row.use_property_decorate = False

@@ -6,6 +6,7 @@ import numpy as np
 from check_points import pixel
 from harness import Skip, add_light, add_points, check, check_close, linear, new_scene, render, reports, saved, set_world
 from mathutils import Vector
+from patina.operators import add_light as sun_operator
 
 PIXEL = 2.0 * 36 / 50 / 64  # world size of one at the point, default camera
 POINT = (0.5 * PIXEL, 1.5 * PIXEL, -2.0)  # at a pixel's centre, where deferred shading puts it
@@ -78,6 +79,27 @@ def test_headlight():
     scene.camera.data.type = 'PANO'
     render()
     check(any("headlight is off" in text for _, text in reports), f"{reports}")
+
+
+def test_points_without_light():
+    """Lit points in a black scene: a warning names them, and Add Light shines on them from the camera's upper left."""
+    scene = lit_point()
+    scene.world = None
+    check(sun_operator.is_dark(scene), "dark")
+    check_close(shade(scene), (0, 0, 0), 1e-6, "black")
+    check(any("no light reaches 'points'" in text for _, text in reports), f"{reports}")
+    set_world((0, 0, 0))
+    check(sun_operator.is_dark(scene), "dark under a black world")
+    set_world((0.1, 0.1, 0.1))
+    check(not sun_operator.is_dark(scene), "light under a gray world")
+    scene.world = None
+    check(bpy.ops.scene.patina_add_light() == {'FINISHED'} and not sun_operator.is_dark(scene), "Add Light")
+    bpy.context.view_layer.update()
+    sun = next(obj for obj in scene.objects if obj.type == 'LIGHT')
+    travels = -sun.matrix_world.col[2].xyz  # the camera looks down -z, x to the right, y up
+    check(travels.x > 0.3 and travels.y < -0.3 and travels.z < -0.3, f"shines along {travels}")
+    check(max(shade(scene)) > 0.02, "still black")
+    check(not any("no light" in text for _, text in reports), f"{reports}")
 
 
 def test_light_from_behind():
