@@ -123,6 +123,14 @@ struct pt_ranges {
     uint32_t rounds; // out: ranges that the kernel took that took most
 };
 
+// What a device was asked to do since it was made: frames report differences.
+struct pt_counts {
+    // OpenGL. empty: dispatches without a workgroup (direct ones; indirect ones where device_gl/count.c is told to look). copies: of buffers to
+    // buffers, and uploads into parts of buffers. waits: calls that block until submitted work is done.
+    uint64_t dispatches, empty, barriers, calls, copies, waits;
+    uint64_t steps; // processor: steps of its threads, each of which ends with a barrier
+};
+
 struct pt_device_ops {
     void (*destroy)(struct patina_device *device);
     // Uninitialised memory, or a copy of source when not NULL. how: bits PT_BORROW, PT_IN_RANGES, PT_ZEROED.
@@ -152,6 +160,8 @@ struct pt_device_ops {
     int (*wait)(struct patina_device *device);
     // Until the next call kernels call look(context) from time to time, from any of their threads; look NULL: no longer.
     void (*watch)(struct patina_device *device, void (*look)(void *context), void *context);
+    // While no frame draws.
+    int (*counts)(struct patina_device *device, struct pt_counts *out);
 };
 
 struct patina_device {

@@ -44,6 +44,7 @@ struct pt_pool {
     atomic_int quit;
     uint32_t spins;
     uint32_t threads, batch;
+    uint64_t steps;              // of work on several threads: under `caller`
     void (*look)(void *context); // NULL: nobody watches
     void *watched;
     struct pt_thread helpers[MAX_THREADS];
@@ -259,6 +260,8 @@ static void close_job(struct pt_pool *pool)
     pt_mutex_unlock(&pool->lock);
 }
 
+uint64_t pt_pool_steps(const struct pt_pool *pool) { return pool ? pool->steps : 0; }
+
 void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *work, void *context)
 {
     if (!items)
@@ -280,6 +283,7 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
             span_of((uint32_t)((uint64_t)items * t / pool->threads), (uint32_t)((uint64_t)items * (t + 1) / pool->threads)),
             memory_order_relaxed);
     if (items > grain) {
+        pool->steps++;
         open_job(pool, &job);
         take_part(&job, 0);
         close_job(pool);

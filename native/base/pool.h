@@ -20,6 +20,8 @@ static inline uint32_t pt_pool_threads_for(uint32_t threads, uint64_t points)
 void pt_pool_destroy(struct pt_pool *pool);
 uint32_t pt_pool_threads(const struct pt_pool *pool); // the caller counts as one
 
+uint64_t pt_pool_steps(const struct pt_pool *pool); // of work on several threads so far; while no work runs
+
 // After each share of the work, and where the work says so, threads call look(context), several at once; NULL: nothing. While no work
 // runs.
 void pt_pool_watch(struct pt_pool *pool, void (*look)(void *context), void *context);

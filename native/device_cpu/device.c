@@ -162,6 +162,12 @@ static void cpu_destroy(struct patina_device *device)
     free(cpu);
 }
 
+static int cpu_counts(struct patina_device *device, struct pt_counts *out)
+{
+    *out = (struct pt_counts){.steps = pt_pool_steps(device->pool)};
+    return PATINA_OK;
+}
+
 static const struct pt_device_ops cpu_ops = {
     .destroy = cpu_destroy,
     .buffer_create = cpu_buffer_create,
@@ -173,6 +179,7 @@ static const struct pt_device_ops cpu_ops = {
     .run_tail = cpu_run_tail,
     .wait = cpu_wait,
     .watch = cpu_watch,
+    .counts = cpu_counts,
 };
 
 int pt_device_cpu_create(const patina_device_desc *desc, const char *isa, struct patina_device **out)

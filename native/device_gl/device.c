@@ -180,6 +180,7 @@ static int open_context(struct pt_gl_device *d, void *unused)
     if (version < GLAD_MAKE_VERSION(4, 3))
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "OpenGL 4.3 is needed, the driver has %d.%d",
                           GLAD_VERSION_MAJOR(version), GLAD_VERSION_MINOR(version));
+    pt_gl_count_begin(d);
     const char *renderer = (const char *)d->gl.GetString(GL_RENDERER);
     const char *text = (const char *)d->gl.GetString(GL_VERSION);
     snprintf(info->description, sizeof info->description, "%s, OpenGL %s", renderer ? renderer : "unknown renderer",
@@ -495,6 +496,8 @@ static void op_watch(struct patina_device *device, void (*look)(void *context), 
 
 static int op_wait(struct patina_device *device) { return call(device, wait_for_work, NULL); }
 
+static int op_counts(struct patina_device *device, struct pt_counts *out) { return call(device, pt_gl_counts, out); }
+
 static void op_destroy(struct patina_device *device)
 {
     struct pt_gl_device *d = (struct pt_gl_device *)device;
@@ -521,6 +524,7 @@ static const struct pt_device_ops ops = {
     .run_groups = op_run_groups,
     .wait = op_wait,
     .watch = op_watch,
+    .counts = op_counts,
 };
 
 int pt_device_gl_create(const patina_device_desc *desc, const char *context, struct patina_device **out)

@@ -57,6 +57,15 @@ struct pt_gl_tiles {
     size_t stride; // words from list to list
 };
 
+// What was asked of the driver since the device was made: count.c.
+struct pt_gl_counter {
+    struct pt_counts counts;
+    GladGLContext driver;   // the driver's own functions
+    int pending;            // work was submitted since the last wait
+    GLuint commands;        // buffer of indirect dispatches' sizes; 0: they are not kept
+    uint32_t command_count; // in it
+};
+
 struct pt_gl_call;
 
 struct pt_gl_device {
@@ -70,7 +79,8 @@ struct pt_gl_device {
     struct pt_gl_call *call;
 
     // Of the GL thread alone.
-    GladGLContext gl;
+    GladGLContext gl; // counts calls: count.c
+    struct pt_gl_counter counter;
     void *context;
     int lost;
     char message[512];
@@ -111,6 +121,13 @@ struct pt_gl_device {
 int pt_gl_fail(struct pt_gl_device *d, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 // Turns whatever GL has to complain about into a code and a sentence: "OpenGL ran out of memory while ...".
 int pt_gl_check(struct pt_gl_device *d, const char *doing);
+
+// count.c
+// Replaces the functions of d->gl by counting ones. In the GL thread, once the functions are loaded.
+void pt_gl_count_begin(struct pt_gl_device *d);
+// counts (out, struct pt_counts): since the device was made. Empty indirect dispatches count between two calls of it, if the environment
+// variable PATINA_GL_COUNT_EMPTY was set at the first: that takes a small copy for each dispatch, which does not count itself.
+int pt_gl_counts(struct pt_gl_device *d, void *counts);
 
 struct pt_gl_unit {
     GLenum format;

@@ -43,13 +43,31 @@ int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
     return error;
 }
 
+// What the device did since.
+static int count_since(struct patina_frame *frame, const struct pt_counts *before)
+{
+    struct pt_counts now = {0};
+    const int error = frame->device->ops->counts(frame->device, &now);
+    frame->counts = (struct pt_counts){.dispatches = now.dispatches - before->dispatches,
+                                       .empty = now.empty - before->empty,
+                                       .barriers = now.barriers - before->barriers,
+                                       .calls = now.calls - before->calls,
+                                       .copies = now.copies - before->copies,
+                                       .waits = now.waits - before->waits,
+                                       .steps = now.steps - before->steps};
+    return error;
+}
+
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene)
 {
+    struct pt_counts before = {0};
+    int counted = frame->device->ops->counts(frame->device, &before);
     double start = pt_milliseconds();
     atomic_store(&frame->progress, 0.0f);
     frame->progress_done = 0.0f;
     frame->progress_share = 1.0f;
     frame->times.count = 0;
+    frame->times.bytes = 0;
     frame->shadow_maps = frame->shadow_size[0] = frame->shadow_size[1] = 0;
     frame->sampling[0] = frame->sampling[1] = 1;
     frame->pager = (struct pt_pager){0};
@@ -57,6 +75,9 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     int error = scene->settings.pixel_samples > 1 ? pt_frame_sample(frame, scene) : pt_frame_draw(frame, scene);
     if (!error)
         frame->shown.stats.ms = pt_milliseconds() - start;
+    frame->counts = (struct pt_counts){0};
+    if (!counted && !error)
+        error = count_since(frame, &before);
     atomic_store(&frame->cancel, 0);
     return error;
 }

@@ -46,6 +46,7 @@ struct patina_frame {
     struct pt_merge *merge;              // while parts are merged; NULL: points are scattered here
     struct pt_pager pager;               // of this render
     struct pt_times times;
+    struct pt_counts counts; // of this render
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     struct pt_layer layers[PATINA_MAX_LAYERS];

@@ -230,10 +230,20 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
         frame->sampling[1], (unsigned long long)frame->shown.peak, (unsigned long long)frame->shown.stats.plane_bytes);
     if (frame->shown.soft_parts)
         PUT(",\"soft\":{\"parts\":%u,\"records\":%u}", frame->shown.soft_parts, frame->shown.soft_records);
-    PUT("},\"mapped\":{\"bytes\":%llu,\"cap\":%llu,\"held\":%llu,\"read\":%llu,\"rounds\":%u,\"returned\":%u}}",
+    PUT("},\"mapped\":{\"bytes\":%llu,\"cap\":%llu,\"held\":%llu,\"read\":%llu,\"rounds\":%u,\"returned\":%u}",
         (unsigned long long)frame->shown.stats.mapped_bytes, (unsigned long long)frame->shown.stats.mapped_cap,
         (unsigned long long)frame->shown.stats.mapped_held, (unsigned long long)frame->shown.stats.mapped_read,
         frame->shown.stats.mapped_rounds, frame->shown.stats.mapped_returned);
+    const struct pt_counts *counts = &frame->counts;
+    if (counts->calls)
+        PUT(",\"gl\":{\"dispatches\":%llu,\"empty\":%llu,\"barriers\":%llu,\"calls\":%llu,\"copies\":%llu,\"waits\":%llu,"
+            "\"bytes\":%llu}}",
+            (unsigned long long)counts->dispatches, (unsigned long long)counts->empty, (unsigned long long)counts->barriers,
+            (unsigned long long)counts->calls, (unsigned long long)counts->copies, (unsigned long long)counts->waits,
+            (unsigned long long)frame->times.bytes);
+    else
+        PUT(",\"cpu\":{\"barriers\":%llu,\"bytes\":%llu}}", (unsigned long long)counts->steps,
+            (unsigned long long)frame->times.bytes);
 #undef PUT
     return length;
 }

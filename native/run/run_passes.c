@@ -51,6 +51,25 @@ static int grow_bins(struct pt_execution *e, const struct pt_pass *pass, struct 
     return PATINA_ERROR_INTERNAL;
 }
 
+// Planes that lie between passes that run as one are neither made nor written. Those that go from layer to layer are, and what `first`
+// says that they leave.
+static int is_made(const struct pt_pass *first, const struct pt_ref *ref)
+{
+    return ref->of != PT_OF_FRAME || pt_plane_rows[ref->which].carried || ref->which + 1 == first->leaves;
+}
+
+// Counts what a pass reads and writes. first: of the passes that run as one with it; NULL: it runs alone.
+static void note_bytes(struct pt_execution *e, const struct pt_pass *first, const struct pt_pass *pass,
+                       struct pt_buffer *const *bound)
+{
+    const struct pt_kernel_row *row = &pt_kernels[pass->kernel];
+    for (uint32_t k = 0; k < pass->ref_count; k++) {
+        const struct pt_buffer_row *buffer = &row->buffers[k < row->fixed ? k : row->fixed + (k - row->fixed) % row->each];
+        if (bound[k] && (!first || is_made(first, &pass->refs[k])))
+            e->times->bytes += (uint64_t)bound[k]->size * (uint64_t)(buffer->read + buffer->written);
+    }
+}
+
 static int run_pass(struct pt_execution *e, uint32_t i)
 {
     const struct pt_pass *pass = &e->plan->passes[i];
@@ -67,6 +86,7 @@ static int run_pass(struct pt_execution *e, uint32_t i)
     for (uint32_t k = 0; k < pass->ref_count && !error; k++)
         error = pt_bind(&e->binder, &pass->refs[k], &bound[k]);
     if (!error) {
+        note_bytes(e, NULL, pass, bound);
         struct call call = {e, pass, arguments};
         do
             error = pt_pager_run(e->pager, e->plan, pass, bound, run_bound, &call);
@@ -75,13 +95,6 @@ static int run_pass(struct pt_execution *e, uint32_t i)
     if (bound != few)
         free(bound);
     return error;
-}
-
-// Planes that lie between passes that run as one are neither made nor written. Those that go from layer to layer are, and what `first`
-// says that they leave.
-static int is_made(const struct pt_pass *first, const struct pt_ref *ref)
-{
-    return ref->of != PT_OF_FRAME || pt_plane_rows[ref->which].carried || ref->which + 1 == first->leaves;
 }
 
 static int bind_between(struct pt_binder *binder, const struct pt_pass *first, const struct pt_ref *ref, struct pt_buffer **out)
@@ -118,6 +131,8 @@ static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
         error = arguments_of(e, first + i, &bound[i].arguments);
         for (uint32_t k = 0; k < passes[i].ref_count && !error; k++)
             error = bind_between(&e->binder, passes, &passes[i].refs[k], next++);
+        if (!error)
+            note_bytes(e, passes, &passes[i], bound[i].buffers);
     }
     if (!error)
         error = e->device->ops->run_tail(e->device, bound, count);
@@ -188,6 +203,8 @@ static int bind_groups(struct pt_execution *e, uint32_t first, uint32_t end, str
             for (uint32_t r = 0; r < pass->ref_count && !error; r++, buffers++)
                 error = taken > 1 ? bind_between(&e->binder, &e->plan->passes[i], &pass->refs[r], buffers)
                                   : pt_bind(&e->binder, &pass->refs[r], buffers);
+            if (!error)
+                note_bytes(e, taken > 1 ? &e->plan->passes[i] : NULL, pass, bound->buffers);
         }
     }
     return error;

@@ -15,6 +15,7 @@ struct pt_timing {
 struct pt_times {
     struct pt_timing each[PT_TIMINGS];
     uint32_t count;
+    uint64_t bytes; // that passes read and write, by the plan: each of their buffers whole
 };
 
 void pt_note_time(struct pt_times *times, const char *name, double ms);

@@ -345,6 +345,8 @@ static int measure(struct job *job)
     int code = times ? PATINA_OK : PATINA_ERROR_MEMORY;
     for (int i = 1; i <= job->options.repeat && !code; i++) {
         patina_camera camera = {.struct_size = sizeof camera};
+        if (i == job->options.repeat && job->options.json) // the statistics of the last frame tell empty dispatches
+            pt_set_environment("PATINA_GL_COUNT_EMPTY", "1");
         code = tool_cancelled() ? PATINA_ERROR_CANCELLED : set_view(job, i, &camera);
         const double start = pt_milliseconds();
         if (!code)

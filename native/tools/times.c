@@ -17,6 +17,7 @@ struct tool_times {
     char pass_names[MAX_PASSES][MAX_NAME];
     double *pass_ms[MAX_PASSES]; // a frame; 0 where the pass did not run
     char *skipped, *planes;      // of the last frame, as JSON
+    char *gl, *cpu;              // what the last frame asked of the device; NULL: of the other kind
 };
 
 struct tool_times *tool_times_create(int frames)
@@ -40,6 +41,8 @@ void tool_times_destroy(struct tool_times *times)
         free(times->pass_ms[i]);
     free(times->skipped);
     free(times->planes);
+    free(times->gl);
+    free(times->cpu);
     free(times->ms);
     free(times);
 }
@@ -101,6 +104,17 @@ static void add_passes(struct tool_times *times, const char *object, size_t leng
     }
 }
 
+// Copies an object of the library's JSON to *kept, in place of what was there, if the JSON has it.
+static void keep_object(const char *json, const char *key, char **kept)
+{
+    size_t length;
+    const char *object = find_object(json, key, &length);
+    if (!object)
+        return;
+    free(*kept);
+    *kept = pt_copy_text(object, length);
+}
+
 int tool_times_add(struct tool_times *times, double ms, const patina_frame *frame)
 {
     const size_t size = patina_frame_stats_json(frame, NULL, 0) + 1;
@@ -114,16 +128,10 @@ int tool_times_add(struct tool_times *times, double ms, const patina_frame *fram
     const char *object = find_object(json, "\"passes\":", &length);
     if (object)
         add_passes(times, object, length);
-    object = find_object(json, "\"skipped\":", &length);
-    if (object) {
-        free(times->skipped);
-        times->skipped = pt_copy_text(object, length);
-    }
-    object = find_object(json, "\"planes\":", &length);
-    if (object) {
-        free(times->planes);
-        times->planes = pt_copy_text(object, length);
-    }
+    keep_object(json, "\"skipped\":", &times->skipped);
+    keep_object(json, "\"planes\":", &times->planes);
+    keep_object(json, "\"gl\":", &times->gl);
+    keep_object(json, "\"cpu\":", &times->cpu);
     free(json);
     times->ms[times->frames++] = ms;
     return 0;
@@ -185,6 +193,10 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     }
     printf("}, \"layers\": %u, \"skipped\": %s, \"planes\": %s, \"peak_mb\": %.1f", stats->layers,
            times->skipped ? times->skipped : "{}", times->planes ? times->planes : "{}", (double)pt_peak_memory() / (1 << 20));
+    if (times->gl)
+        printf(", \"gl\": %s", times->gl);
+    if (times->cpu)
+        printf(", \"cpu\": %s", times->cpu);
     printf(", \"mapped\": {\"bytes\": %llu, \"cap\": %llu, \"held\": %llu, \"read\": %llu, \"rounds\": %u, \"returned\": %u}",
            (unsigned long long)stats->mapped_bytes, (unsigned long long)stats->mapped_cap,
            (unsigned long long)stats->mapped_held, (unsigned long long)stats->mapped_read, stats->mapped_rounds,

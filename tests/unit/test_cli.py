@@ -616,6 +616,22 @@ def test_threads_batches_and_levels_agree():
 
 # ---- numbers -------------------------------------------------------------------------------------------------------
 
+def test_stats_of_opengl():
+    """What a render asks of OpenGL: the same counts for each frame of one view, and as many bytes for as many points."""
+    ball("asked.ply")
+    if subprocess.run([*PATINA, "render", "asked.ply", "-o", "asked.png", "--size", "8x8", "--device", "gl-egl"], capture_output=True,
+                      cwd=FOLDER, timeout=300, check=False).returncode:
+        print("skip stats_of_opengl: there is no OpenGL device here")
+        return
+    frames = [json.loads(run("render", "asked.ply", "--stats", "json", "--repeat", "1", "--size", "64x48", "--device", "gl-egl").stdout)["gl"]
+              for _ in range(2)]
+    assert frames[0] == frames[1], frames
+    counts = frames[0]
+    assert set(counts) == {"dispatches", "empty", "barriers", "calls", "copies", "waits", "bytes"}, counts
+    assert 0 < counts["dispatches"] <= counts["barriers"] <= counts["calls"] and counts["empty"] < counts["dispatches"], counts
+    assert counts["waits"] >= 1 and counts["bytes"] > 20000 * 12, counts
+
+
 def test_stats():
     ball("stats.ply")
     done = run("render", "stats.ply", "--stats", "json", "--repeat", "5", "--size", "320x200", "--device", "cpu")
@@ -627,6 +643,7 @@ def test_stats():
     assert 0 < stats["ms_min"] <= stats["ms_median"] <= stats["ms_max"]
     assert stats["passes"] and all(isinstance(ms, float) and ms >= 0 for ms in stats["passes"].values())
     assert "scatter" in stats["passes"]
+    assert "gl" not in stats and stats["cpu"]["barriers"] > 0 and stats["cpu"]["bytes"] > 20000 * 12, stats["cpu"]
     assert sum(stats["passes"].values()) < 3 * stats["ms_max"] + 1
     assert all(isinstance(reason, str) and reason for reason in stats["skipped"].values())
     assert 320 * 200 * 16 < stats["planes"]["peak"] <= stats["planes"]["held"], stats["planes"]  # the camera turns: bins of discs vary

@@ -744,6 +744,11 @@ PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_st
 // there are soft points, "soft":{"parts":..,"records":..}: in how many parts they are drawn, and how many the largest has room for, at
 // 80 bytes each: peak counts them.
 // "samples":{"grid":..,"shifts":..}: how pixel_samples were taken, pixels on each side of one, times shifted.
+// "gl":{"dispatches":..,"empty":..,"barriers":..,"calls":..,"copies":..,"waits":..,"bytes":..} of an OpenGL device, "cpu":{"barriers":..,
+// "bytes":..} of the processor: what the render asked of it. empty: dispatches without a workgroup; indirect ones count if the environment
+// variable PATINA_GL_COUNT_EMPTY was set before the render. copies: between buffers, and into parts of buffers. waits: calls that block
+// until submitted work is done. barriers of the processor: steps of several threads, each of which ends when all are done. bytes: what the
+// passes read and write by the plan, each of their buffers whole.
 // Returns the full length; truncates to size.
 PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
 // The plan as text, a line a pass, without rendering. Returns the full length.
