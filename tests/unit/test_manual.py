@@ -53,6 +53,13 @@ class Prose(unittest.TestCase):
         self.assertEqual(self.sentences(f"{half}. {half}.\n\n- {half}\n- {half}\n\n```sh\n{WORDS}\n```\n"), [])
         self.assertEqual(self.sentences(f"{half}\n{half}.\n"), [1], "a sentence goes on in the next line")
 
+    def test_wrong_terms(self) -> None:
+        def of(text: str) -> list[str]:
+            return [fault for _, fault in check.wrong_terms(text)]
+        self.assertEqual(of("Two Colours, coloured; analysed."),
+                         ["write 'color' instead of 'colours'", "write 'color' instead of 'coloured'", "write 'analyze' instead of 'analysed'"])
+        self.assertEqual(of("A `picture` in *Baked Picture*, `analyse`; colors."), [])
+
     def test_dead_links(self) -> None:
         def of(text: str) -> list[str]:
             return [fault for _, fault in check.dead_links(ROOT / "addon/README.md", text)]
