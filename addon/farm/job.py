@@ -109,6 +109,7 @@ def parse(arguments: list) -> "tuple[Path, dict]":
     import task
     if not arguments or arguments[0].startswith("-"):
         raise Wrong(__doc__)
+    arguments = [part for word in arguments for part in (word.split("=", 1) if word.startswith("--") and "=" in word else [word])]  # --NAME=VALUE
     folder, rest, own = Path(arguments[0]).resolve(), [], {"patina": "patina", "rounds": "1", "name": "", "convert": ""}
     valued = {"--frames", "--tiles", "--parts", "--rounds", "--patina", "--name", "-o"}
     at = 1

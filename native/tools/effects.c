@@ -187,8 +187,6 @@ void tool_print_effects(FILE *out)
         wide += opened ? fprintf(out, "]") : 0;
         fprintf(out, "%*s%s\n", wide + 2 > COLUMN ? 2 : COLUMN - wide, "", options[i].help);
     }
-    fprintf(
-        out,
-        "  --effect FIELD=VALUE               any field of an effect by its name, as patina/effects.def lists them; VALUE:\n"
-        "                                     a number, three of a color or an axis, or a choice's word\n");
 }
+
+const char *tool_effect_option(size_t index) { return options[index].name; }

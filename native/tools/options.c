@@ -195,6 +195,12 @@ static int parse_switch(const char *name, struct tool_options *options)
     return 0;
 }
 
+int tool_is_switch(const char *name)
+{
+    struct tool_options ignored;
+    return !strcmp(name, "--grid") || !parse_switch(name, &ignored);
+}
+
 // Of silhouettes. All but --lines itself shape those that it asks for.
 static enum outcome parse_line_option(const char *name, const char *value, struct tool_options *o)
 {

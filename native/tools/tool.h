@@ -18,6 +18,10 @@ int tool_merge(int count, char **arguments);
 int tool_info(int count, char **arguments);
 int tool_convert(int count, char **arguments);
 int tool_analyse(int count, char **arguments);
+int tool_help(int count, char **arguments);
+
+// The commands, the topics, and the names of their options.
+void tool_print_usage(FILE *out);
 
 // ---- messages, on stderr -----------------------------------------------------------------------------------------
 
@@ -124,13 +128,16 @@ int parse_numbers(const char *text, double *numbers, int least, int most);
 int tool_parse_memory(const char *text, uint64_t *bytes);
 // Options of effects (effects.c): 0 good, -1 a bad value, 1 no such option.
 int tool_parse_effect(const char *name, const char *value, patina_effects *effects);
-void tool_print_effects(FILE *out); // the lines that tell of them
+void tool_print_effects(FILE *out);           // the lines of `patina help` about them
+const char *tool_effect_option(size_t index); // the name of an effect's option; NULL behind the last
 
 // NAME[,MIN,MAX] of a pass. 0, or -1 for a bad value.
 int tool_parse_pass(const char *value, struct tool_options *options);
 
 // Fills options from the arguments of `render`; files point into the vector, which is reordered. Returns a tool_exit.
 int tool_parse_render(int count, char **arguments, struct tool_options *options);
+// Whether an option of any command takes no value.
+int tool_is_switch(const char *name);
 
 // Options of tiles, strips and parts. 0 taken, -1 a bad value, 1 none of them.
 int tool_parse_farm(const char *name, const char *value, struct tool_options *options);

@@ -66,11 +66,14 @@ def test_install():
     inside = os.environ["BLENDER_USER_SCRIPTS" if LEGACY else "BLENDER_USER_EXTENSIONS"]
     assert Path(inside).resolve() in folder().parents, folder()
     assert (folder() / "LICENSE").is_file()
-    manual = folder() / "manual/index.html"
-    page = manual.read_text(encoding="utf-8")
-    pictures = re.findall(r'src="([^"]+)"', page)
-    assert len(pictures) > 5 and all((manual.parent / picture).is_file() for picture in pictures), pictures
-    assert "<table>" in page and "<pre>" in page and 'href="..' not in page
+    pages = {path: path.read_text(encoding="utf-8") for path in (folder() / "manual").glob("*.html")}
+    images = {image for page in pages.values() for image in re.findall(r'src="([^"]+)"', page)}
+    assert len(images) > 5 and all((folder() / "manual" / image).is_file() for image in images), images
+    assert (folder() / "manual/index.html") in pages and len(pages) > 20, sorted(pages)
+    for path, page in pages.items():
+        links = [link.partition("#")[0] for link in re.findall(r'href="([^":]+)"', page)]
+        assert all((path.parent / link).is_file() for link in links if link), (path.name, links)
+    assert not list((folder() / "manual").glob("*.md"))
     if not LEGACY and list((ROOT / "build/out/wheels").glob("*.whl")):
         import laspy
         import lazrs

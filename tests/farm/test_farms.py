@@ -66,6 +66,8 @@ def stumbling(name, victim, once):
 
 def test_a_task_restarts_alone_with_the_same_bytes():
     job = make("alone", "--tiles", "2x1", "-o", "alone.png", *SITE)
+    joined = make("joined", "--tiles=2x1", "-o", "alone.png", "site.cloud", "--size=160x120", "--lit", "--shadows")
+    assert (joined / "job.json").read_bytes() == (job / "job.json").read_bytes(), "--NAME=VALUE is --NAME VALUE"
     task(job, "tile", 1)
     first = (job / "tiles/00001.png").read_bytes()
     (job / "tiles/00001.png").write_bytes(b"half")

@@ -8,6 +8,7 @@ import os
 import random
 import re
 import shlex
+import shutil
 import signal
 import struct
 import subprocess
@@ -200,6 +201,42 @@ def test_help_and_version():
     assert "patina render" in run("help").stdout
     assert run("--help").stdout == run("help").stdout
     assert "patina render" in run(code=2).stderr
+
+
+def test_help_has_topics():
+    """Each topic fits on a screen, the topics hold every option that the sources parse, and an option leads to its topic."""
+    overview, everything = run("help").stdout, run("help", "all").stdout
+    topics = re.findall(r"^  ([a-z]+) ", overview, re.M)
+    assert len(topics) > 8, topics
+    pages = {topic: run("help", topic).stdout for topic in topics}
+    for topic, page in pages.items():
+        assert 1 < len(page.splitlines()) <= 40 and page.startswith(f"{topic}: ") and page in everything, topic
+    native = Path(__file__).resolve().parents[2] / "native"
+    sources = [*native.glob("tools/*.c"), native / "include/patina/effects.def"]
+    parsed = {name for path in sources for name in re.findall(r'"(--[a-z][a-z-]+)"', path.read_text(encoding="utf-8"))}
+    assert len(parsed) > 80, parsed
+    for name in parsed - {"--help", "--version"}:
+        assert name in overview.split(), name
+        shown = run("help", name).stdout
+        found = [page for page in pages.values() if page in shown]
+        assert found and all(re.search(rf"^  [^\n]{{0,34}}{name}(,| |$)", page, re.M) for page in found), (name, shown)
+    assert run("help", "paint", code=2).stderr.startswith("patina: help: 'paint' is neither")
+
+
+def test_values_behind_equals():
+    ball("equals.ply", 500)
+    run("render", "equals.ply", "-o", "apart.png", "--size", "40x30", "--sun", "-30,20", "--lit", "--effect", "edl_strength=1")
+    run("render", "equals.ply", "--output=joined.png", "--size=40x30", "--sun=-30,20", "--lit", "--effect=edl_strength=1")
+    assert (FOLDER / "apart.png").read_bytes() == (FOLDER / "joined.png").read_bytes()
+    shutil.copy(FOLDER / "equals.ply", FOLDER / "--odd=name.ply")
+    run("render", "-o", "odd.png", "--size=40x30", "--", "--odd=name.ply")
+    run("analyse", "equals.ply", "-o", "equals-out.ply", "--neighbours=8")
+    for arguments, said in ((["--lit=yes"], "'--lit' takes no value"), (["--size="], "'' is no value for option '--size'"),
+                            (["--nonsense=1"], "there is no option '--nonsense'")):
+        done = run("render", "equals.ply", "-o", "x.png", *arguments, code=2)
+        assert said in done.stderr, done.stderr
+    assert "'--grid' takes no value" in run("analyse", "equals.ply", "-o", "y.ply", "--grid=1", code=2).stderr
+    assert not (FOLDER / "x.png").exists() and not (FOLDER / "y.ply").exists()
 
 
 def test_version_is_of_the_sources():
@@ -569,7 +606,7 @@ def test_effects():
     run(*base, "--effect", "hatch_levels=1", "--effect", "hatch_spacing=8", "--effect", "hatch_opacity=0.5", "--effect",
         "hatch_ground=1", "--effect", "hatch_color=0.2,0,0")
     assert seen[(FOLDER / "effect.png").read_bytes()] == ("--hatch", "1,8,0.5,1,0.2,0,0"), "by their names fields are others"
-    help_text = run("help").stdout
+    help_text = run("help", "effects").stdout
     for option in ("--edl STRENGTH[,RADIUS] ", "--hatch LEVELS[,SPACING,OPACITY,GROUND,R,G,B] ", "--fog START,END[,DENSITY,R,G,B] ",
                    "--focus DISTANCE,APERTURE ", "--paper GRAIN[,R,G,B] "):
         assert option in help_text, option
