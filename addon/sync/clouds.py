@@ -147,6 +147,7 @@ class CloudItem:
     edits: edits.State = edits.State()
     soft: soft.Soft | None = None
     dotted: bool = False  # Blender's overlays draw its points too
+    blender_depth: bool = False  # Blender draws its depth for overlays from 4.4 on
     told: str = ""  # of its scans, where they are drawn as range images: ranges.py
     analyzed: bool = True  # where its points are to be analyzed at all: this picture needs it
 
@@ -340,7 +341,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
             told = ranges.told_of(obj, patina.surface)
             dotted = obj.type == 'MESH' and not solid and not link
-            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted, told, analyzed))
+            own_depth = solid or obj.type == 'POINTCLOUD' and not link
+            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted, own_depth, told, analyzed))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
