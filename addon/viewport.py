@@ -20,6 +20,7 @@ import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
+from mathutils import Color
 
 from . import backdrop, cryptomatte, dots, mattes, native, overlays, pace, render, sky, streaming, sync
 from .jobs import Pause, Steps
@@ -345,7 +346,8 @@ class Viewport:
         shader.uniform_sampler("picture", self._drawn[2])
         shader.uniform_float("transform", context.region_data.perspective_matrix)
         shader.uniform_float("region", (x0, y0, x1 - x0, y1 - y0))
-        shader.uniform_float("tint", (*theme.vertex_select, (theme.vertex_size + 1.0) * scale))
+        tint = Color(theme.vertex_select).from_srgb_to_scene_linear()  # the overlays' framebuffer turns it back
+        shader.uniform_float("tint", (*tint, (theme.vertex_size + 1.0) * scale))
         for name, value in self._depths(context, SHOWN).items():
             shader.uniform_float(name, value)
         self._chosen_batch.draw(shader)
