@@ -347,9 +347,10 @@ class Viewport:
         shader.uniform_float("transform", context.region_data.perspective_matrix)
         shader.uniform_float("region", (x0, y0, x1 - x0, y1 - y0))
         tint = Color(theme.vertex_select).from_srgb_to_scene_linear()  # the overlays' framebuffer turns it back
-        shader.uniform_float("tint", (*tint, (theme.vertex_size + 1.0) * scale))
-        for name, value in self._depths(context, SHOWN).items():
-            shader.uniform_float(name, value)
+        shader.uniform_float("tint", (*tint, 1.0))
+        depths = self._depths(context, SHOWN)
+        shader.uniform_float("offset", (depths["cover"], depths["rounding"], depths["away"], (theme.vertex_size + 1.0) * scale))
+        shader.uniform_float("projection", depths["projection"])
         self._chosen_batch.draw(shader)
         gpu.state.program_point_size_set(False)
 
@@ -687,7 +688,7 @@ _VERTEX = """
 void main()
 {
     gl_Position = transform * vec4(pos, 1.0);
-    gl_PointSize = tint.w;
+    gl_PointSize = offset.w;
     vec2 at = (gl_Position.xy / gl_Position.w * 0.5 + 0.5 - region.xy) / region.zw;
     ivec2 size = textureSize(picture, 0);
     bool within = all(greaterThanEqual(at, vec2(0.0))) && all(lessThan(at, vec2(1.0)));
@@ -706,6 +707,11 @@ void main()
 
 # The depth of Blender's projection that belongs to a linear z.
 _DEPTH = """
+#if defined(CHOSEN)
+#define cover offset.x
+#define rounding offset.y
+#define away offset.z
+#endif
 #if !defined(EXACT) && !defined(SMOOTH)
 float depth_of(float far)
 {
@@ -779,15 +785,15 @@ def _shader(kind: str) -> gpu.types.GPUShader:
         info.define(kind)
         if kind in {'DEPTH', 'ERASE', 'CHOSEN'}:
             info.push_constant('VEC4', "projection")
-            for name in ("cover", "rounding", "away"):
+            for name in ("cover", "rounding", "away") if kind != 'CHOSEN' else ():
                 info.push_constant('FLOAT', name)
             if hasattr(info, "depth_write") and kind != 'CHOSEN':
                 info.depth_write('ANY')
         info.sampler(0, 'FLOAT_2D', "picture")
         if kind == 'CHOSEN':
-            info.push_constant('MAT4', "transform")
-            info.push_constant('VEC4', "region")
-            info.push_constant('VEC4', "tint")
+            info.push_constant('MAT4', "transform")  # with the others 128 bytes, which all devices allow
+            for name in ("offset", "region", "tint"):
+                info.push_constant('VEC4', name)
             info.vertex_in(0, 'VEC3', "pos")
         else:
             interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")

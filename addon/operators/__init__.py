@@ -10,6 +10,7 @@ from . import (
     clips,
     colors,
     combine,
+    convert_points,
     export_points,
     farm,
     import_points,
@@ -30,7 +31,7 @@ from . import (
     world,
 )
 
-_MODULES = (analyze, balance, clips, colors, import_points, addresses, export_points, combine, farm, linked_points, plan, points, points_keys, points_tools, preferences,
+_MODULES = (analyze, balance, clips, colors, import_points, addresses, export_points, combine, convert_points, farm, linked_points, plan, points, points_keys, points_tools, preferences,
             scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
 
 
