@@ -38,6 +38,8 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
+from . import point_data
+
 VERSION = 1
 PLAIN = "scan"  # the style of defaults
 SHIPPED = Path(__file__).resolve().parent / "presets/styles"
@@ -297,7 +299,7 @@ def _owner(group: bpy.types.PropertyGroup, path: str) -> tuple[bpy.types.Propert
 
 def is_cloud(obj: bpy.types.Object) -> bool:
     """Whether Patina may draw the object's points."""
-    return obj.type == 'POINTCLOUD' or obj.type == 'MESH' and (bool(obj.patina.linked_file) or not obj.data.polygons)
+    return point_data.is_cloud(obj)
 
 
 def apply_to_scene(scene: bpy.types.Scene, key: str) -> list[str]:

@@ -20,8 +20,9 @@ import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
+from mathutils import Color
 
-from . import backdrop, dots, mattes, native, pace, render, sky, streaming, sync
+from . import backdrop, cryptomatte, dots, mattes, native, overlays, pace, render, sky, streaming, sync
 from .jobs import Pause, Steps
 from .native.points import highlight
 from .sync import analysis, edits
@@ -31,8 +32,9 @@ from .sync.kept import CHECKS
 
 TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
-HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that overlays' depth is nearer than the surface: Blender's dots of vertices are hidden, or not
+HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that a depth is nearer than the surface: Blender's dots of vertices are hidden, or not
 ROUNDING = 4.0 * 2.0 ** -24  # and by so many steps of Blender's depths of 24 bits: each may be meters, far away in a view that begins near
+FAR = 1e30  # of a depth: nothing is there
 REST = 0.12  # seconds without motion after which the whole picture is drawn
 RESIZED = 0.25  # seconds that a redraw waits for the first picture, or that of a new size
 ARRIVALS = 0.2  # seconds between two pictures of points that arrive
@@ -83,6 +85,7 @@ class Shown:
     clouds: list[sync.CloudItem]  # built
     color: np.ndarray  # (height, width, 4), premultiplied, scene-linear; the next picture but one overwrites it
     depth: np.ndarray  # (height, width, 1), linear z; nearer where points lie that the picture leaves out and Blender draws
+    hiding: np.ndarray  # the same, far away where Blender draws a depth of its own; behind it overlays are hidden
     behind: sync.World | None  # what lies behind it
     pixel: float  # its width, at distance 1 in perspective
     place: tuple[float, float, float, float]  # of the viewport that it covers, 0..1
@@ -146,6 +149,8 @@ class Viewport:
         self._sky = sky.Sky()
         self._bettered: Bettered | None = None  # what is shown, while samples of it are pending
         self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture | None] | None = None  # colour; depth for overlays
+        self._chosen: np.ndarray | None = None  # places of vertices that are selected in Edit Mode
+        self._chosen_batch: gpu.types.GPUBatch | None = None
         _VIEWPORTS.add(self)
 
     def update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
@@ -159,6 +164,7 @@ class Viewport:
         self.pace.budget = depsgraph.scene.patina.navigation_ms / 1000.0
         self._scene = scene
         self._view, self._clips = view, sync.view_clips(context.region_data)
+        self._chosen, self._chosen_batch = overlays.selected_vertices(context, depsgraph), None
         self._local = context.space_data.local_view is not None
         self._moved = time.monotonic()
         self._ask(self.pace.level, pace.MOVING if self._many else pace.EXACT)
@@ -272,15 +278,15 @@ class Viewport:
         return (f", {points:,} points on their way ({size:,.1f} MB)" if points else "") + said
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
-        overlays = context.space_data.overlay.show_overlays
+        shows_overlays = context.space_data.overlay.show_overlays
         if self._drawn is None or self._drawn[0] is not self.shown:
             if self.shown.wish.view != self._view and self.shown.first:  # it moves on
                 self.pace.seen(time.monotonic() - self.shown.wish.asked - self.shown.stats["ms"] / 1000.0)
             same = self._drawn and self._drawn[0].depth is self.shown.depth
             self._drawn = (self.shown, _upload(self.shown), self._drawn[2] if same else None)
-        if overlays and self._drawn[2] is None:
-            self._drawn = (*self._drawn[:2], _texture(_covering(self.shown.depth), 'R32F'))
-        shown, color, depth = self._drawn
+        if shows_overlays and self._drawn[2] is None:
+            self._drawn = (*self._drawn[:2], _texture(_covering(self.shown.hiding), 'R32F'))
+        shown, color, _ = self._drawn
         corners = [2.0 * share - 1.0 for share in shown.place]
         gpu.state.depth_test_set('NONE')
         gpu.state.depth_mask_set(False)
@@ -290,19 +296,63 @@ class Viewport:
             gpu.state.blend_set('ALPHA_PREMULT')
         _fill_rectangle(corners, 'EXACT' if shown.wish.level.shrink == 1 else 'SMOOTH', color)
         gpu.state.blend_set('NONE')
-        if overlays:  # where nothing of Blender's is nearer, so that they are hidden rightly
-            projection, camera = context.region_data.window_matrix, shown.wish.view.camera
-            near = camera.near_clip if camera.orthographic else 0.0
+        if not shows_overlays:
+            return
+        if overlays.KEEPS_DEPTH:
+            self._hide_overlays(context, 'DEPTH')
+        if not overlays.KEEPS_DEPTH or self._chosen is not None:
+            overlays.after(context.region, lambda: self._finish_overlays(bpy.context))
+
+    def _hide_overlays(self, context: bpy.types.Context, kind: str) -> None:
+        """Hides the overlays behind the picture: by a depth that Blender tests them against, or ERASE: those that are drawn already."""
+        shown, _, depth = self._drawn
+        if kind == 'DEPTH':  # where nothing of Blender's is nearer
             gpu.state.color_mask_set(False, False, False, False)
-            gpu.state.depth_test_set('LESS_EQUAL')
-            gpu.state.depth_mask_set(True)
-            cover = SHOWN if _selects_vertices(context) else HIDDEN
-            _fill_rectangle(corners, 'DEPTH', depth, cover=cover * shown.pixel, rounding=math.copysign(ROUNDING, cover),
-                            away=context.region_data.view_matrix.translation.length, projection=(
-                                projection[2][2], projection[2][3], near, camera.orthographic))
-            gpu.state.color_mask_set(True, True, True, True)
-            gpu.state.depth_test_set('NONE')
-            gpu.state.depth_mask_set(False)
+        gpu.state.depth_test_set('LESS_EQUAL')
+        gpu.state.depth_mask_set(kind == 'DEPTH')
+        _fill_rectangle([2.0 * share - 1.0 for share in shown.place], kind, depth, **self._depths(context, HIDDEN))
+        gpu.state.color_mask_set(True, True, True, True)
+        gpu.state.depth_test_set('NONE')
+        gpu.state.depth_mask_set(False)
+
+    def _depths(self, context: bpy.types.Context, cover: float) -> dict[str, float | tuple[float, ...]]:
+        """Uniforms that turn the picture's linear z into depths of Blender's projection."""
+        projection, camera = context.region_data.window_matrix, self.shown.wish.view.camera
+        near = camera.near_clip if camera.orthographic else 0.0
+        return {"cover": cover * self.shown.pixel, "rounding": math.copysign(ROUNDING, cover),
+                "away": context.region_data.view_matrix.translation.length,
+                "projection": (projection[2][2], projection[2][3], near, camera.orthographic)}
+
+    def _finish_overlays(self, context: bpy.types.Context) -> None:
+        """After Blender has drawn the overlays."""
+        if self._closed or self._drawn is None or self._drawn[2] is None:
+            return
+        if not overlays.KEEPS_DEPTH:
+            gpu.state.blend_set('NONE')
+            self._hide_overlays(context, 'ERASE')
+            overlays.draw_marks(context)
+        if self._chosen is not None and len(self._chosen):
+            self._draw_chosen(context)
+
+    def _draw_chosen(self, context: bpy.types.Context) -> None:
+        """Vertices that are selected in Edit Mode, on the side that is seen."""
+        theme, scale = context.preferences.themes[0].view_3d, context.preferences.system.ui_scale
+        shader = _shader('CHOSEN')
+        if self._chosen_batch is None:
+            self._chosen_batch = batch_for_shader(shader, 'POINTS', {"pos": self._chosen})
+        x0, y0, x1, y1 = self._drawn[0].place
+        gpu.state.program_point_size_set(True)
+        shader.bind()
+        shader.uniform_sampler("picture", self._drawn[2])
+        shader.uniform_float("transform", context.region_data.perspective_matrix)
+        shader.uniform_float("region", (x0, y0, x1 - x0, y1 - y0))
+        tint = Color(theme.vertex_select).from_srgb_to_scene_linear()  # the overlays' framebuffer turns it back
+        shader.uniform_float("tint", (*tint, 1.0))
+        depths = self._depths(context, SHOWN)
+        shader.uniform_float("offset", (depths["cover"], depths["rounding"], depths["away"], (theme.vertex_size + 1.0) * scale))
+        shader.uniform_float("projection", depths["projection"])
+        self._chosen_batch.draw(shader)
+        gpu.state.program_point_size_set(False)
 
     # ---- the work
 
@@ -453,7 +503,8 @@ class Viewport:
         colors = [color]
         for beside, other in parts[1:]:
             colors += yield from self._draw_frame(beside, other, ("COMBINED",), [])
-        yield from self._hide_dots(device, dots.left_out(description, wish.clips), depth)
+        hiding = self._without_own(frame, description, depth)
+        yield from self._hide_dots(device, dots.left_out(description, wish.clips), hiding)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         if not self._many or wish.detail == pace.MOVING:  # that of others says nothing of pictures while the view moves
@@ -461,10 +512,22 @@ class Viewport:
         behind = backdrop.pixels(description) if self._others and description.behind else None  # which is in the picture then
         bettered = Bettered(wish, parts, colors, description, behind)
         self._keep_bettering(bettered)
-        return Shown(wish, description.clouds, bettered.picture(), depth, None if self._others else description.behind,
+        return Shown(wish, description.clouds, bettered.picture(), depth, hiding, None if self._others else description.behind,
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.label)
+
+    def _without_own(self, frame: native.Frame, description: sync.SceneDescription, depth: np.ndarray) -> np.ndarray:
+        """The depth, far away where a pixel shows what Blender's overlays draw a depth of: PointCloud objects and faces."""
+        own = [*(item.blender_depth for item in description.clouds), *(True for _ in description.meshes)]
+        if overlays.KEEPS_DEPTH or not any(own):
+            return depth
+        if all(own):
+            return np.full_like(depth, FAR)
+        x0, y0, x1, y1 = description.settings.region
+        shown = cryptomatte.shown_items(frame.read_numbers(), description)
+        shown = shown if shown.shape == depth.shape[:2] else shown[y0:y1, x0:x1]
+        return np.where(np.array([*own, False])[shown][..., None], np.float32(FAR), depth)
 
     def _hide_dots(self, device: native.Device, left_out: sync.SceneDescription | None, depth: np.ndarray) -> Steps[None]:
         """Of points that Blender draws though the picture leaves them out: depth becomes theirs where it is nearer."""
@@ -606,11 +669,6 @@ def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
     return gpu.types.GPUTexture((width, height), format=kind, data=gpu.types.Buffer('FLOAT', flat.size, flat))
 
 
-def _selects_vertices(context: bpy.types.Context) -> bool:
-    """Whether vertices are selected in Edit Mode: then it has to be seen which, though the others' dots cover the picture."""
-    return context.mode == 'EDIT_MESH' and any(obj.data.total_vert_sel for obj in context.objects_in_mode)
-
-
 def _covering(depth: np.ndarray) -> np.ndarray:
     """The nearest of 5 x 5 pixels, for all pixels. Here and not in the shader: a GPU in software takes ten times as long."""
     height, width = depth.shape[:2]
@@ -626,11 +684,43 @@ def _covering(depth: np.ndarray) -> np.ndarray:
 
 
 _VERTEX = """
+#if defined(CHOSEN)
+void main()
+{
+    gl_Position = transform * vec4(pos, 1.0);
+    gl_PointSize = offset.w;
+    vec2 at = (gl_Position.xy / gl_Position.w * 0.5 + 0.5 - region.xy) / region.zw;
+    ivec2 size = textureSize(picture, 0);
+    bool within = all(greaterThanEqual(at, vec2(0.0))) && all(lessThan(at, vec2(1.0)));
+    float far = within ? texelFetch(picture, min(ivec2(at * vec2(size)), size - 1), 0).r : 1e30;
+    if (0.5 * gl_Position.z / gl_Position.w + 0.5 > depth_of(far))
+        gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+}
+#else
 void main()
 {
     place = uv;
     gl_Position = vec4(pos, 0.0, 1.0);
 }
+#endif
+"""
+
+# The depth of Blender's projection that belongs to a linear z.
+_DEPTH = """
+#if defined(CHOSEN)
+#define cover offset.x
+#define rounding offset.y
+#define away offset.z
+#endif
+#if !defined(EXACT) && !defined(SMOOTH)
+float depth_of(float far)
+{
+    float z = far - cover * (projection.w > 0.5 ? 1.0 : far);
+    float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z) : projection.y / z - projection.x;
+    float steps = rounding * (projection.w > 0.5 ? 1.0 : 1.0 + away / max(far, 1e-6));
+    return far < 1e29 ? clamp(0.5 * ndc + 0.5 - steps, 0.0, 1.0) : 1.0;
+}
+#endif
 """
 
 # One program for each thing to draw: a GPU in software executes both sides of every branch, and looks at depths for each
@@ -638,20 +728,28 @@ void main()
 _FRAGMENT = """
 const vec4 largest = vec4(65000.0); // Blender's half floats end at 65504; what overflows turns the viewport black
 
+#if !defined(CHOSEN)
 vec4 exact()
 {
     ivec2 size = textureSize(picture, 0);
     return texelFetch(picture, min(ivec2(place * vec2(size)), size - 1), 0);
 }
+#endif
 
 void main()
 {
-#if defined(DEPTH)
+#if defined(CHOSEN)
+    vec2 off = gl_PointCoord - 0.5;
+    if (dot(off, off) > 0.25)
+        discard;
+    color = vec4(tint.rgb, 1.0);
+#elif defined(DEPTH) || defined(ERASE)
     float far = exact().r;
-    float z = far - cover * (projection.w > 0.5 ? 1.0 : far);
-    float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z) : projection.y / z - projection.x;
-    float steps = rounding * (projection.w > 0.5 ? 1.0 : 1.0 + away / max(far, 1e-6));
-    gl_FragDepth = far < 1e29 ? clamp(0.5 * ndc + 0.5 - steps, 0.0, 1.0) : 1.0;
+#if defined(ERASE)
+    if (far >= 1e29)
+        discard;
+#endif
+    gl_FragDepth = depth_of(far);
     color = vec4(0.0);
 #elif defined(EXACT)
     color = min(exact(), largest);
@@ -665,10 +763,10 @@ void main()
 def _fill_rectangle(corners: list[float], kind: str, texture: gpu.types.GPUTexture,
                     **uniforms: float | tuple[float, ...]) -> None:
     """Draws a texture over x0, y0, x1, y1 of -1..1. kind: EXACT, texel by texel; SMOOTH, between them; DEPTH, linear z as
-    depths of Blender's projection, uniforms of which are its third row, the near plane and whether it is orthographic.
+    depths of Blender's projection, uniforms of which are its third row, the near plane and whether it is orthographic; ERASE, nothing
+    at all where something is, at that depth.
     Overlays hide behind a depth two pixels wider than the surface and `cover` nearer: Blender draws the vertices of our points as dots
-    over every engine's picture, and these lie just behind it. Where vertices are selected in Edit Mode it is farther, and hides
-    those of the other side. `rounding` moves it further, in shares of the whole depth, for Blender's vertices are rounded before they
+    over every engine's picture, and these lie just behind it. `rounding` moves it further, in shares of the whole depth, for Blender's vertices are rounded before they
     are projected: the more, the farther the eye is from the world's middle, `away`, measured by the distance seen."""
     shader = _shader(kind)
     x0, y0, x1, y1 = corners
@@ -683,22 +781,28 @@ def _fill_rectangle(corners: list[float], kind: str, texture: gpu.types.GPUTextu
 
 def _shader(kind: str) -> gpu.types.GPUShader:
     if kind not in _compiled:
-        interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")
-        interface.smooth('VEC2', "place")
         info = gpu.types.GPUShaderCreateInfo()
         info.define(kind)
-        if kind == 'DEPTH':
+        if kind in {'DEPTH', 'ERASE', 'CHOSEN'}:
             info.push_constant('VEC4', "projection")
-            for name in ("cover", "rounding", "away"):
+            for name in ("cover", "rounding", "away") if kind != 'CHOSEN' else ():
                 info.push_constant('FLOAT', name)
-            if hasattr(info, "depth_write"):
+            if hasattr(info, "depth_write") and kind != 'CHOSEN':
                 info.depth_write('ANY')
         info.sampler(0, 'FLOAT_2D', "picture")
-        info.vertex_in(0, 'VEC2', "pos")
-        info.vertex_in(1, 'VEC2', "uv")
-        info.vertex_out(interface)
+        if kind == 'CHOSEN':
+            info.push_constant('MAT4', "transform")  # with the others 128 bytes, which all devices allow
+            for name in ("offset", "region", "tint"):
+                info.push_constant('VEC4', name)
+            info.vertex_in(0, 'VEC3', "pos")
+        else:
+            interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")
+            interface.smooth('VEC2', "place")
+            info.vertex_in(0, 'VEC2', "pos")
+            info.vertex_in(1, 'VEC2', "uv")
+            info.vertex_out(interface)
         info.fragment_out(0, 'VEC4', "color")
-        info.vertex_source(_VERTEX)
-        info.fragment_source(_FRAGMENT)
+        info.vertex_source(_DEPTH + _VERTEX if kind == 'CHOSEN' else _VERTEX)
+        info.fragment_source(_FRAGMENT if kind == 'CHOSEN' else _DEPTH + _FRAGMENT)
         _compiled[kind] = gpu.shader.create_from_info(info)
     return _compiled[kind]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files → points → meshes of vertices with attributes. One module a format reads; the mesh is made here."""
+"""Files → points → PointClouds or meshes of vertices, with attributes. One module a format reads; the data is made here."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from types import ModuleType
 import bpy
 import numpy as np
 
+from .. import point_data
 from ..jobs import Steps
 from ..native import PatinaError
 from .reading import Filter, Pieces, PointFile, Progress, name_of, told
 
-__all__ = ["FORMATS", "Filter", "Pieces", "PointFile", "Progress", "in_pieces", "name_of", "preview", "reader", "steps", "to_mesh", "told"]
+__all__ = ["FORMATS", "Filter", "Pieces", "PointFile", "Progress", "in_pieces", "name_of", "preview", "reader", "steps", "to_data", "told"]
 
 # One colour and one normal attribute, under names that every Blender from 3.4 on allows ("normal" is reserved
 # before 4.0) and that sync.attributes looks for.
-COLOR_NAME = "Col"
+COLOR_NAME = "Col"  # of meshes
+CLOUD_COLOR_NAME = "color"  # of PointClouds, as Blender's own tools name it
 NORMAL_NAME = "Normal"
 
 # What Blender takes bytes as: as they are from 4.2 on (0.1 ms a million), before that rather as wider ones (25 ms, bytes 55).
@@ -65,58 +67,63 @@ def preview(path: Path) -> list[str]:
         return [told(error)]
 
 
-def to_mesh(points: PointFile) -> bpy.types.Mesh:
-    """A mesh of vertices alone. Byte colours stay bytes, and so do scalars from -128 to 127 that come as such; everything else
-    is float. Takes the arrays out of `points` one by one: a large cloud needs little more memory than the mesh."""
-    mesh = bpy.data.meshes.new(told(points.name))
-    mesh.vertices.add(len(points.positions))
-    mesh.vertices.foreach_set("co", points.positions.reshape(-1))
+def to_data(points: PointFile, cloud: bool) -> bpy.types.ID:
+    """A PointCloud, or a mesh of vertices alone. Byte colours stay bytes, and so do scalars from -128 to 127 that come as such;
+    everything else is float. Takes the arrays out of `points` one by one: a large file needs little more memory than the data."""
+    data = point_data.new(told(points.name), points.positions, cloud)
+    places = points.positions if cloud and point_data.RADIUS not in points.scalars else None
     points.positions = points.positions[:0].copy()
+    name = CLOUD_COLOR_NAME if cloud else COLOR_NAME
     if points.colors is not None:
-        _add_colors(mesh, points.colors)
+        name = _add_colors(data, name, points.colors)
         points.colors = None
+        if cloud:
+            data.materials.append(point_data.color_material(name))
     if points.normals is not None:
-        _add(mesh, NORMAL_NAME, 'FLOAT_VECTOR').data.foreach_set("vector", points.normals.reshape(-1))
+        _add(data, NORMAL_NAME, 'FLOAT_VECTOR').data.foreach_set("vector", points.normals.reshape(-1))
         points.normals = None
     for name in list(points.scalars):
-        _add_scalar(mesh, name, points.scalars.pop(name))
-    selected = mesh.attributes.get(".select_vert")
-    if selected:  # Blender selects new vertices with a byte each, and some versions copy it
-        mesh.attributes.remove(selected)
+        _add_scalar(data, name, points.scalars.pop(name))
     for name, value in points.notes.items():
-        mesh[f"patina_{name}"] = value
-    mesh.update()
-    return mesh
+        data[f"patina_{name}"] = value
+    data = point_data.finished(data, cloud)
+    if places is not None:
+        point_data.add_display_radii(data, places)
+    return data
 
 
-def _add_colors(mesh: bpy.types.Mesh, colors: np.ndarray) -> None:
+def _add_colors(data: bpy.types.ID, name: str, colors: np.ndarray) -> str:
+    """Returns the name of the attribute."""
     if colors.dtype == np.uint8:
-        attribute = _add(mesh, COLOR_NAME, 'BYTE_COLOR')
+        attribute = _add(data, name, 'BYTE_COLOR')
         attribute.data.foreach_set("color_srgb", (colors / np.float32(255)).reshape(-1))
     else:
-        attribute = _add(mesh, COLOR_NAME, 'FLOAT_COLOR')
+        attribute = _add(data, name, 'FLOAT_COLOR')
         attribute.data.foreach_set("color", colors.reshape(-1))
-    mesh.color_attributes.active_color = mesh.attributes[attribute.name]
+    name = attribute.name
+    if hasattr(data.color_attributes, "active_color"):  # of meshes
+        data.color_attributes.active_color = data.attributes[name]
+    return name
 
 
-def _add_scalar(mesh: bpy.types.Mesh, name: str, values: np.ndarray) -> None:
-    if values.dtype.itemsize == 1 and values.max(initial=0) <= 127:
+def _add_scalar(data: bpy.types.ID, name: str, values: np.ndarray) -> None:
+    if values.dtype.itemsize == 1 and values.max(initial=0) <= 127 and name != point_data.RADIUS:  # that of Blender's is a float
         values = values.astype(WHOLE)
         kind = 'INT8'
     else:
         values = values.astype(np.float32, copy=False)
         kind = 'FLOAT'
-    _add(mesh, name, kind).data.foreach_set("value", values)
+    _add(data, name, kind).data.foreach_set("value", values)
 
 
-def _add(mesh: bpy.types.Mesh, name: str, kind: str) -> bpy.types.Attribute:
+def _add(data: bpy.types.ID, name: str, kind: str) -> bpy.types.Attribute:
     """A new point attribute; Blender refuses some names ("id", "crease", ... by version) and clashes: those get
     a prefix."""
-    if name and name not in mesh.attributes:
+    if name and name not in data.attributes:
         try:
-            attribute = mesh.attributes.new(name, kind, 'POINT')
+            attribute = data.attributes.new(name, kind, 'POINT')
         except RuntimeError:
             attribute = None
         if attribute:
             return attribute
-    return mesh.attributes.new(f"file_{name}", kind, 'POINT')
+    return data.attributes.new(f"file_{name}", kind, 'POINT')

@@ -11,6 +11,7 @@ from . import (
     clips,
     colors,
     combine,
+    convert_points,
     export_points,
     farm,
     import_points,
@@ -31,8 +32,8 @@ from . import (
     world,
 )
 
-_MODULES = (add_light, analyze, balance, clips, colors, import_points, addresses, export_points, combine, farm, linked_points, plan, points,
-            points_keys, points_tools, preferences, scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
+_MODULES = (add_light, analyze, balance, clips, colors, import_points, addresses, export_points, combine, convert_points, farm, linked_points, plan,
+            points, points_keys, points_tools, preferences, scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
 
 
 def register() -> None:

@@ -11,7 +11,7 @@ from bpy.props import BoolProperty
 from bpy.types import Context, Event, Operator
 from mathutils import Matrix, Vector
 
-from .. import jobs, native
+from .. import jobs, native, point_data
 from ..importers import NORMAL_NAME, WHOLE, Progress
 from ..sync import analysis, analyzing, attributes, linked, losses
 from .steps import Stepped
@@ -48,7 +48,7 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
     @classmethod
     def poll(cls, context: Context) -> bool:
         obj = context.object
-        return (obj is not None and obj.type in {'MESH', 'POINTCLOUD'} and obj.mode == 'OBJECT' and obj.data.library is None
+        return (point_data.may_have_points(obj) and obj.mode == 'OBJECT' and obj.data.library is None
                 and not obj.patina.linked_file)
 
     def execute(self, context: Context) -> set[str]:
@@ -61,7 +61,7 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
 
     def _analyze(self, obj: bpy.types.Object) -> jobs.Steps[set[str]]:
         data = obj.data
-        count = len(data.vertices if obj.type == 'MESH' else data.points)
+        count = point_data.count_of(data)
         positions = attributes.positions(data, count) if count else None
         if positions is None:
             self.report({'ERROR'}, f"Patina: '{obj.name}' has no points")
@@ -97,7 +97,7 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
                 walked["density"] = np.where(found["spacing"] > 0.0, found["spacing"] ** -2.0, 0.0).astype(np.float32)
             for name, values in walked.items():
                 _write(data, name, values)
-        data.update() if obj.type == 'MESH' else data.update_tag()
+        point_data.changed(data)
         kinds = ", ".join(f"{number:,} {name.lower()}" for name, number in zip(native.KINDS, cloud.kinds, strict=True) if number)
         self.report({'INFO'}, f"Analyzed {count:,} points: {kinds}")
         return {'FINISHED'}
@@ -106,11 +106,7 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
 def _write(data: bpy.types.ID, name: str, values: np.ndarray) -> None:
     """Makes the point attribute, in place of one that is there."""
     kind, key = (WRITTEN | SOFT)[name]
-    known = data.attributes.get(name)
-    if known and (known.domain != 'POINT' or known.data_type != kind):
-        data.attributes.remove(known)
-        known = None
-    attribute = known or data.attributes.new(name, kind, 'POINT')
+    attribute = point_data.writable(data, name, kind)
     if kind == 'INT8':
         values = values.astype(WHOLE)
     attribute.data.foreach_set(key, values.reshape(-1))
@@ -180,7 +176,7 @@ def _move_views(context: Context, corners: list[Vector]) -> None:
 
 
 def _has_points(obj: bpy.types.Object) -> bool:
-    return obj.type in {'MESH', 'POINTCLOUD'}
+    return point_data.may_have_points(obj)
 
 
 def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], frame: int) -> list[Vector]:
@@ -211,7 +207,7 @@ def dense_corners(obj: bpy.types.Object, frame: int) -> list[Vector]:
         box = _box_of(jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud)
     else:
         with attributes.readable(obj) as data:
-            count = len(data.vertices if obj.type == 'MESH' else data.points)
+            count = point_data.count_of(data)
             positions = attributes.positions(data, count) if count else None
         if positions is None:
             return []

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from bpy.types import Context, Object, Operator
 
-from .. import importers, jobs, native
+from .. import importers, jobs, native, point_data
 from ..sync import attributes, edits, linked, scans_of
 from . import scans
 
@@ -119,7 +119,7 @@ def read(obj: Object, context: Context) -> tuple[np.ndarray, np.ndarray | None, 
         file = jobs.run(lambda: module.read(source.path, importers.Filter(), importers.Progress()), lambda: None, lambda: False)
         return file.positions, _light(file.colors), *scans_of.scans_in(file.scalars)
     data = obj.data
-    count = len(data.vertices if obj.type == 'MESH' else data.points)
+    count = point_data.count_of(data)
     return (attributes.positions(data, count), _light(attributes.colors(data, count, obj.patina.color_attribute)), *scans.of_points(obj))
 
 

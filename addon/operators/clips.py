@@ -7,6 +7,7 @@ import bpy
 from bpy.types import Context, Menu, Object, Operator
 from mathutils import Vector
 
+from .. import point_data
 from ..engine import PatinaRenderEngine
 
 SMALLEST = 1e-3  # half size of a box around points that lie in a plane
@@ -17,7 +18,7 @@ def _corners(context: Context) -> list[Vector]:
     def of(obj: Object) -> list[Vector]:
         return [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
 
-    chosen = [obj for obj in context.selected_objects if obj.type in {'MESH', 'POINTCLOUD'}]
+    chosen = [obj for obj in context.selected_objects if point_data.may_have_points(obj)]
     return [corner for obj in chosen for corner in of(obj)]
 
 

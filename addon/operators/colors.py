@@ -8,7 +8,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 from bpy.types import Context, Operator
 
-from .. import jobs, native
+from .. import jobs, native, point_data
 from ..sync import attributes, linked
 
 STOPS = 6  # of a custom ramp that begins as one of ours
@@ -20,7 +20,7 @@ class _ColorOperator:
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return context.object is not None and context.object.type in {'MESH', 'POINTCLOUD'}
+        return point_data.may_have_points(context.object)
 
 
 class PATINA_OT_new_ramp(_ColorOperator, Operator):
@@ -68,7 +68,7 @@ class PATINA_OT_robust_range(_ColorOperator, Operator):
 
 def _range(obj: bpy.types.Object) -> tuple[float, float] | None:
     group, data = obj.patina.colors, obj.data
-    count = len(data.vertices if obj.type == 'MESH' else data.points)
+    count = point_data.count_of(data)
     if group.source == 'SCALAR':
         values = attributes.scalars(data, count, group.scalar)
     elif group.source in {'HEIGHT', 'OBJECT_HEIGHT'}:

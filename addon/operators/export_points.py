@@ -14,7 +14,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
 
-from .. import exporters, importers, jobs, native
+from .. import exporters, importers, jobs, native, point_data
 from ..importers import origin, scans
 from ..sync import analysis, attributes, edits, linked
 from . import set_up
@@ -107,7 +107,7 @@ class PATINA_OT_export_points(Operator, ExportHelper):
         """Evaluated, and how many were left out: faces' corners are no scan, unless there is nothing else."""
         depsgraph = context.evaluated_depsgraph_get()
         found = [obj.evaluated_get(depsgraph) for obj in context.view_layer.objects
-                 if obj.type in {'MESH', 'POINTCLOUD'} and obj.visible_get() and (obj.select_get() or not self.selected)]
+                 if point_data.may_have_points(obj) and obj.visible_get() and (obj.select_get() or not self.selected)]
         points = [obj for obj in found if set_up.is_points(obj)]
         return (points, len(found) - len(points)) if points else (found, 0)
 
@@ -126,7 +126,7 @@ def _gps_start(objects: list[bpy.types.Object]) -> float:
 def read_local(obj: bpy.types.Object) -> exporters.Points | None:
     """An evaluated object's points in its own space, its origin added."""
     data = obj.data
-    count = len(data.vertices)
+    count = point_data.count_of(data)
     local = attributes.positions(data, count) if count else None
     if local is None:
         return None
@@ -217,7 +217,7 @@ def _to_file(obj: bpy.types.Object, scene: bpy.types.Scene) -> tuple[np.ndarray,
 
 
 def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> exporters.Points | None:
-    count = len(data.vertices if obj.type == 'MESH' else data.points)
+    count = point_data.count_of(data)
     local = attributes.positions(data, count) if count else None
     if local is None:
         return None
@@ -235,8 +235,9 @@ def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> 
 
 def _scalars(data: bpy.types.ID, count: int) -> dict[str, np.ndarray]:
     found = {}
+    shown_only = {point_data.RADIUS} if point_data.are_for_display(data) else ()
     for attribute in data.attributes:
-        if attribute.data_type in {'FLOAT', 'INT', 'INT8'} and not attribute.name.startswith("."):
+        if attribute.data_type in {'FLOAT', 'INT', 'INT8'} and not attribute.name.startswith(".") and attribute.name not in shown_only:
             values = attributes.scalars(data, count, attribute.name)
             if values is not None:
                 found[attribute.name] = values[:, 0]

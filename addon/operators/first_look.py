@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from bpy.types import Object, Scene
 
-from .. import jobs, native
+from .. import jobs, native, point_data
 from ..sync import attributes, linked
 from . import view_transform
 
@@ -35,7 +35,7 @@ def data_of(obj: Object, frame: int) -> Data:
         found = source and jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
         return Data.COLORS if not found or found.has_colors else Data.POSITIONS
     with attributes.readable(obj) as data:
-        count = len(data.vertices if obj.type == 'MESH' else data.points)
+        count = point_data.count_of(data)
         rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
         if rgb is not None and attributes.colored(rgb).any():
             return Data.COLORS
@@ -83,7 +83,7 @@ def _intensity(obj: Object) -> str:
 def _show_intensity(obj: Object) -> str:
     name = _intensity(obj)
     _show_scalar(obj, name, 'GREY')
-    values = attributes.scalars(obj.data, len(obj.data.attributes[name].data), name)
+    values = attributes.scalars(obj.data, point_data.count_of(obj.data), name)
     values = values[np.isfinite(values)] if values is not None else np.empty(0)
     group = obj.patina.colors
     if len(values) and values.min() < values.max():

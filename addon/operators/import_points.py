@@ -12,7 +12,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 from bpy.types import Context, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
-from .. import importers, jobs, native, styles
+from .. import importers, jobs, native, point_data, styles
 from ..importers import PointFile, name_of, origin, saved, told
 from ..sync import addresses, clouds, files, linked, sequence
 from . import set_up, stations
@@ -54,6 +54,12 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         items=(
             ('Z', "Z", "As in Blender, and in surveys", 0), ('Y', "Y", "As in many scans of objects", 1),
             ('NEGATIVE_Y', "-Y", "As in photogrammetry that begins with a camera", 2)))
+    kind: EnumProperty(
+        name="Points As", default='AUTO', description="What holds the points in Blender",
+        items=(
+            ('AUTO', "Automatic", "Point clouds from Blender 4.5 on, meshes before", 0),
+            ('POINTCLOUD', "Point Cloud", "Blender's Solid and Material Preview shading show the points with their colors", 1),
+            ('MESH', "Mesh", "Vertices: modifiers other than Geometry Nodes work on these alone", 2)))
     frame: BoolProperty(name="Frame Points", default=False,
                         description="Aim the scene's camera at the points afterwards; strays do not count")
     stations: BoolProperty(
@@ -91,6 +97,9 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         layout.prop(self, "unit")
         layout.prop(self, "scale")
         layout.prop(self, "up_axis")
+        row = layout.row()
+        row.active = not self.link
+        row.prop(self, "kind")
         layout.prop(self, "frame")
         layout.prop(self, "stations")
         layout.prop(self, "link")
@@ -130,31 +139,39 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
 
     def _import(self, context: Context, paths: list[Path]) -> jobs.Steps[set[str]]:
         found = []
+        cloud = self._wants_clouds(context)
         for index, path in enumerate(paths):
             try:
                 points = yield from self._read(path, self._progress.part(index, len(paths)))
             except native.PatinaCancelled:
-                return self._ended([mesh for mesh, *_ in found])
+                return self._ended([data for data, *_ in found])
             if points:
                 units = points.notes.get("units", METERS)
-                found.append((importers.to_mesh(points), points.origin, units, points.splats))
+                found.append((importers.to_data(points, cloud), points.origin, units, points.splats))
         if not found:
             return {'CANCELLED'}
         _select_none()
-        for mesh, own, units, splats in found:
-            obj = bpy.data.objects.new(mesh.name, mesh)
+        for data, own, units, splats in found:
+            obj = bpy.data.objects.new(data.name, data)
             self._add(context, obj, own, units)
             if splats:
                 obj.patina.opacity_attribute, obj.patina.radius_attribute = "opacity", "radius"
         self._finish(context)
-        count = sum(len(mesh.vertices) for mesh, *_ in found)
+        count = sum(point_data.count_of(data) for data, *_ in found)
         self.report({'INFO'}, f"Imported {count:,} point{'s' * (count != 1)} from {len(found)} file{'s' * (len(found) > 1)}. "
                               + _told_next(context))
         return {'FINISHED'}
 
-    def _ended(self, meshes: list[bpy.types.Mesh]) -> set[str]:
-        for mesh in meshes:
-            bpy.data.meshes.remove(mesh)
+    def _wants_clouds(self, context: Context) -> bool:
+        """Whether points become PointClouds."""
+        if self.kind == 'POINTCLOUD' and not point_data.HAS_CLOUDS:
+            self._tell('WARNING', "this Blender has no point clouds of its own: the points become a mesh. Blender 4.5 and later have them")
+        wanted = self.kind != 'MESH' and point_data.HAS_CLOUDS
+        return wanted and (point_data.RESIZES or context.mode == 'OBJECT')  # Blender's conversion works in Object Mode alone
+
+    def _ended(self, found: list[bpy.types.ID]) -> set[str]:
+        for data in found:
+            (bpy.data.meshes if isinstance(data, bpy.types.Mesh) else bpy.data.pointclouds).remove(data)
         self.report({'INFO'}, "Patina: nothing was imported, for it was ended before")
         return {'CANCELLED'}
 

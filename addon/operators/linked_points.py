@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
 
-from .. import exporters, importers, jobs, native
+from .. import exporters, importers, jobs, native, point_data
 from ..importers import origin
 from ..sync import edits, files, linked
 from . import export_points
@@ -40,7 +40,7 @@ class PATINA_OT_linked_to_mesh(Operator):
         if points is None:
             return {'CANCELLED'}
         box = obj.data
-        obj.data = importers.to_mesh(points)
+        obj.data = importers.to_data(points, cloud=False)
         files.assign(obj, "")
         if edits.PROPERTY in obj:
             del obj[edits.PROPERTY]
@@ -62,8 +62,7 @@ class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
     @classmethod
     def poll(cls, context: Context) -> bool:
         obj = context.object
-        return (obj is not None and obj.type == 'MESH' and obj.mode == 'OBJECT' and not obj.patina.linked_file
-                and not len(obj.data.polygons))
+        return point_data.holds_points(obj) and obj.mode == 'OBJECT'
 
     def execute(self, context: Context) -> set[str]:
         obj, path = context.object, Path(bpy.path.abspath(self.filepath))
@@ -77,6 +76,8 @@ class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
         except (native.PatinaError, OSError) as error:
             self.report({'ERROR'}, importers.told(f"Patina: {path.name}: {error}"))
             return {'CANCELLED'}
+        if obj.type != 'MESH':  # a linked cloud shows a box
+            point_data.convert([obj], 'MESH')
         obj.data = linked.box_mesh(obj.name, found.box, found)
         # the file's own origin may differ from the object's by what float32 holds
         obj[origin.PROPERTY] = [float(value) for value in found.origin]

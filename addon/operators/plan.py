@@ -12,6 +12,7 @@ from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
 from mathutils import Matrix, Vector
 
+from .. import point_data
 from ..engine import PatinaRenderEngine
 from ..importers import origin
 
@@ -101,7 +102,7 @@ def _box(context: Context) -> tuple[np.ndarray, np.ndarray] | None:
     """Lower and upper corner of the selected objects with points, in Blender's coordinates."""
     depsgraph = context.evaluated_depsgraph_get()
     corners = [obj.matrix_world @ Vector(corner) for obj in context.view_layer.objects
-               if obj.select_get() and obj.type in {'MESH', 'POINTCLOUD'}
+               if obj.select_get() and point_data.may_have_points(obj)
                for corner in obj.evaluated_get(depsgraph).bound_box]
     if not corners:
         return None

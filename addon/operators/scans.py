@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.types import Context, Object, Operator
 
-from .. import importers, native
+from .. import importers, native, point_data
 from ..importers import scans
 from ..sync import attributes, edits, scans_of
 from . import points
@@ -19,7 +19,7 @@ def refused(obj: Object | None) -> str:
     """Why the scans of an object cannot be listed; empty: they can."""
     if obj is not None and obj.patina.linked_file:
         return points.editable(obj)
-    if obj is None or obj.type not in {'MESH', 'POINTCLOUD'} or obj.type == 'MESH' and len(obj.data.polygons):
+    if not point_data.holds_points(obj):
         return "the active object has no points"
     if obj.library or obj.mode != 'OBJECT':
         return "the object belongs to another file" if obj.library else "only in Object Mode"
@@ -29,7 +29,7 @@ def refused(obj: Object | None) -> str:
 def of_points(obj: Object) -> tuple[scans_of.Scans | None, np.ndarray | None]:
     """Which scans a mesh's or point cloud's points are of; None where there is one, or it is not said."""
     data = obj.data
-    count = len(data.vertices if obj.type == 'MESH' else data.points)
+    count = point_data.count_of(data)
     columns = {name: attributes.scalars(data, count, name) for name in scans_of.SCAN_NAMES}
     return scans_of.scans_in({name: values[:, 0] for name, values in columns.items() if values is not None})
 

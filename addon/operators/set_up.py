@@ -10,7 +10,7 @@ import bpy
 from bpy.types import Context, Object, Operator, Scene
 from mathutils import Vector
 
-from .. import native
+from .. import native, point_data
 from ..engine import PatinaRenderEngine
 from . import analyze, first_look, stations
 
@@ -19,7 +19,7 @@ LEAST = 0.05  # W/m2 from a lamp that count as light; the start scene's gives a 
 
 
 def is_points(obj: Object) -> bool:
-    return obj.type == 'POINTCLOUD' or obj.type == 'MESH' and (bool(obj.patina.linked_file) or not obj.data.polygons)
+    return point_data.is_cloud(obj)
 
 
 def untouched(scene: Scene) -> bool:

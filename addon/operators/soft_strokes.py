@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from bpy.types import Attribute, Context, Object
 
-from .. import native
+from .. import native, point_data
 from ..sync import attributes, edits
 from ..sync.analyzing import ANALYSES
 from .view_tools import Place, Seen, describe
@@ -19,17 +19,17 @@ CORNERS = 32  # of the brush
 
 def why_not(obj: Object | None) -> str:
     """Why an object's points cannot be painted; empty: they can."""
-    if obj is None or obj.type != 'MESH':
-        return "the active object is no mesh of points"
+    if not point_data.may_have_points(obj):
+        return "the active object has no points"
     if obj.patina.linked_file:
         return "a linked file's points are not Blender's: let an attribute of the file say which are soft, or import it without Link"
     if obj.library or obj.data.library:
         return "the object belongs to another file"
     if obj.mode != 'OBJECT':
         return "only in Object Mode"
-    if len(obj.data.polygons):
+    if not point_data.holds_points(obj):
         return "the mesh has faces: only clouds of points are painted"
-    return "" if len(obj.data.vertices) else "the mesh has no points"
+    return "" if point_data.count_of(obj.data) else "the object has no points"
 
 
 # ---- the attribute ---------------------------------------------------------------------------------------------------
@@ -54,7 +54,7 @@ def _attribute(obj: Object) -> Attribute:
 
 def _begin(obj: Object, named: str) -> Attribute:
     """Another one for the panel, with what it goes by so far: weights of a group, whole numbers of 0 and 1."""
-    group, count = obj.patina.soft, len(obj.data.vertices)
+    group, count = obj.patina.soft, point_data.count_of(obj.data)
     old = attributes.scalars(obj.data, count, named)
     old = attributes.weights(obj, obj.data, count, named) if old is None else old
     going_on = old is not None and 0.0 <= old.min() and old.max() <= 1.0
@@ -83,11 +83,11 @@ def _number(obj: Object, values: np.ndarray, strength: float) -> float:
 
 def write(obj: Object, bits: edits.Bits, strength: float) -> None:
     """Makes points of an object as soft as that, and has pictures show it."""
-    name, count = _attribute(obj).name, len(obj.data.vertices)
+    name, count = _attribute(obj).name, point_data.count_of(obj.data)
     values = attributes.scalars(obj.data, count, name).reshape(-1)
     values[edits.flags(bits, count)] = _number(obj, values, strength)
-    obj.data.attributes[name].data.foreach_set("value", values)
-    obj.data.update()
+    point_data.writable(obj.data, name, 'FLOAT').data.foreach_set("value", values)
+    point_data.changed(obj.data)
 
 
 # ---- a stroke --------------------------------------------------------------------------------------------------------
@@ -99,7 +99,7 @@ class Stroke:
     def __init__(self, context: Context, obj: Object, radius: float, through: bool) -> None:
         self.name, self.radius = obj.name, radius
         self._last: Place | None = None
-        count = len(obj.data.vertices)
+        count = point_data.count_of(obj.data)
         self.bits = np.zeros((count + 7) // 8, np.uint8)
         with ANALYSES.drawing():
             description = describe(context)

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .. import jobs, native, pairs
+from .. import jobs, native, pairs, point_data
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
@@ -147,6 +147,7 @@ class CloudItem:
     edits: edits.State = edits.State()
     soft: soft.Soft | None = None
     dotted: bool = False  # Blender's overlays draw its points too
+    blender_depth: bool = False  # Blender draws its depth for overlays from 4.4 on
     told: str = ""  # of its scans, where they are drawn as range images: ranges.py
     analyzed: bool = True  # where its points are to be analyzed at all: this picture needs it
 
@@ -297,7 +298,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
         obj = instance.object
         if obj.type == 'LIGHT' and instance.show_self:
             unknown.look_at_light(instance)
-        if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera or clips.cuts(obj):
+        if not point_data.may_have_points(obj) or not instance.show_self or not obj.visible_camera or clips.cuts(obj):
             continue
         if not visible(instance) or not losses.is_placed(instance, notices):
             continue
@@ -340,7 +341,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
             told = ranges.told_of(obj, patina.surface)
             dotted = obj.type == 'MESH' and not solid and not link
-            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted, told, analyzed))
+            own_depth = solid or obj.type == 'POINTCLOUD' and not link
+            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted, own_depth, told, analyzed))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
@@ -565,7 +567,7 @@ def _radius_name(obj: bpy.types.Object, surface: str) -> str:
     the artist wants discs."""
     if obj.patina.radius_attribute or obj.type != 'POINTCLOUD' or surface != 'SPLATS':
         return obj.patina.radius_attribute
-    return "radius" if "radius" in obj.data.attributes else ""
+    return point_data.RADIUS if point_data.RADIUS in obj.data.attributes and not point_data.are_for_display(obj.data) else ""
 
 
 def _read(obj: bpy.types.Object, notices: list[str], radius_name: str, mesh_points: int,
@@ -581,7 +583,7 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     if mesh_points:
         found = meshes.sample(obj, data, mesh_points)
         return PointArrays(*found, None) if found else None
-    count = len(data.vertices if obj.type == 'MESH' else data.points)
+    count = point_data.count_of(data)
     if count == 0:
         return None
     positions = attributes.positions(data, count)

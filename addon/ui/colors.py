@@ -6,10 +6,9 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
+from .. import point_data
 from ..properties.colors import CLASS_NAMES, class_name
 from .panels import PatinaPanel
-
-_POINTS = {'MESH', 'POINTCLOUD'}
 
 
 class ColorPanel(PatinaPanel):
@@ -20,7 +19,7 @@ class ColorPanel(PatinaPanel):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return super().poll(context) and context.object and context.object.type in _POINTS
+        return super().poll(context) and point_data.may_have_points(context.object)
 
 
 class PATINA_PT_color(ColorPanel, Panel):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel, Scene
 
+from .. import point_data
 from ..engine import PatinaRenderEngine
 from ..operators import view_transform
 from ..sync import estimates
@@ -36,7 +37,7 @@ class _PatinaObjectPanel(PatinaPanel):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return super().poll(context) and context.object and context.object.type in {'MESH', 'POINTCLOUD'}
+        return super().poll(context) and point_data.may_have_points(context.object)
 
 
 class PATINA_PT_surface(PatinaPanel, Panel):
@@ -191,6 +192,10 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
                 column.prop(patina, "stream")
             column.operator("object.patina_linked_to_mesh")
         else:
+            if context.object.type == 'POINTCLOUD':
+                column.operator("object.patina_to_mesh")
+            elif point_data.HAS_CLOUDS:
+                column.operator("object.patina_to_point_cloud")
             column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from ..operators import add_light
+from .. import point_data
+from ..operators import add_light, convert_points
 from ..operators.clips import PATINA_OT_add_clip_box, PATINA_OT_add_clip_plane
 from . import rows
 from .panels import PatinaPanel
@@ -17,10 +18,7 @@ from .statistics import SidebarPanel
 def _shows_points(context: Context) -> bool:
     """Whether the active object is points, or may be: modifiers make points of faces."""
     obj = context.object
-    if obj is None or obj.type not in {'MESH', 'POINTCLOUD'}:
-        return False
-    return (obj.type == 'POINTCLOUD' or bool(obj.patina.linked_file) or bool(obj.modifiers) or not len(obj.data.polygons)
-            or context.scene.patina.meshes == 'POINTS')
+    return point_data.may_have_points(obj) and (point_data.is_cloud(obj) or bool(obj.modifiers) or context.scene.patina.meshes == 'POINTS')
 
 
 class _FirstLines:
@@ -33,6 +31,8 @@ class _FirstLines:
 
     def draw(self, context: Context) -> None:
         layout = self.layout
+        if not convert_points.why_not(context.object, 'POINTCLOUD'):
+            layout.operator(convert_points.PATINA_OT_to_point_cloud.bl_idname, icon='POINTCLOUD_DATA')
         layout.use_property_split = True
         layout.use_property_decorate = self.decorated
         patina = context.object.patina

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Menu, Panel, UIList
 
+from .. import point_data
 from ..sync import edits, scans_of
 from . import rows
 from .statistics import SidebarPanel
@@ -139,7 +140,7 @@ class PATINA_PT_scans(SidebarPanel, Panel):
 
 
 def _has_scans(obj: bpy.types.Object | None) -> bool:
-    if obj is None or obj.type not in {'MESH', 'POINTCLOUD'}:
+    if not point_data.may_have_points(obj):
         return False
     return bool(obj.patina.linked_file or obj.patina.points.scans) or any(name in obj.data.attributes for name in scans_of.SCAN_NAMES)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Object, Panel, PropertyGroup, UILayout
 
-from .. import histogram
+from .. import histogram, point_data
 from ..sync.colors import scalar_name
 from . import rows
 from .colors import ColorPanel
@@ -26,7 +26,7 @@ class PATINA_PT_soft(ColorPanel, Panel):
         layout.use_property_split = True
         obj = context.object
         group = obj.patina.soft
-        if obj.type == 'MESH' and not len(obj.data.polygons):
+        if point_data.holds_points(obj):
             self._draw_brush(context)
         layout = layout.column()
         layout.active = group.use
