@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from harness import REPOSITORY, SCRATCH, check, saved
 from patina.operators import set_up
-from window import area, invoke_import, screenshot, shown, window_region
+from window import area, invoke_import, screenshot, shown, whole_window, window_region
 
 POINTS = int(os.environ.get("PATINA_NEWCOMER_POINTS", "20000"))
 
@@ -131,14 +131,6 @@ class Hand:
                 window.event_simulate('ESC', value, x=20, y=20)
             yield self.pause(1.0)
         check(False, f"clicks at {places} had no effect")
-
-
-def whole_window(name):
-    """Kept where pictures are."""
-    if "PATINA_SCREENSHOTS" in os.environ:
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
-            bpy.ops.screen.screenshot(filepath=str(Path(os.environ["PATINA_SCREENSHOTS"]) / f"{name}.png"))
 
 
 def test_newcomers_clicks():

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the X server shows, without asking Blender: its own screenshots draw the window once more first."""
+"""What the X server shows. Blender's own screenshots are not used: they draw the window once more first, and with software
+OpenGL they are black in Blender 4.3 and 5.2."""
 
 import ctypes
+import struct
+import time
+import zlib
 from ctypes import POINTER, Structure, c_char_p, c_int, c_uint, c_ulong, c_void_p
 
 import numpy as np
 
 _Z_PIXMAP = 2
+LOOK = 0.02  # seconds between two looks that must be equal
+LOOKS = 50  # at most, if something on the screen always moves
 
 
 class _Image(Structure):
@@ -44,3 +50,27 @@ def pixels():
     finally:
         x11.XCloseDisplay(display)
     return rows[::-1, :4 * width].reshape(height, width, 4)[..., 2::-1]
+
+
+def settled_pixels():
+    """The same, once two looks in a row are equal: what Blender has drawn reaches the screen a moment later."""
+    last = pixels()
+    for _ in range(LOOKS):
+        time.sleep(LOOK)
+        now = pixels()
+        if np.array_equal(now, last):
+            break
+        last = now
+    return now
+
+
+def write_png(path, picture):
+    """(height, width, 3) uint8, row 0 at the bottom."""
+    height, width = picture.shape[:2]
+    rows = np.zeros((height, 1 + 3 * width), np.uint8)
+    rows[:, 1:] = picture[::-1].reshape(height, 3 * width)
+    with open(path, "wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n")
+        for kind, data in ((b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)), (b"IDAT", zlib.compress(rows.tobytes(), 1)),
+                           (b"IEND", b"")):
+            file.write(struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)))

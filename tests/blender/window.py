@@ -5,7 +5,8 @@ import os
 
 import bpy
 import numpy as np
-from harness import SCRATCH, new_scene
+import screen
+from harness import new_scene
 from mathutils import Quaternion
 from patina import viewport
 from patina.sync.analyzing import ANALYSES
@@ -62,9 +63,13 @@ def setup(overlays=False):
 
 
 def clip_border(xmin, xmax, ymin, ymax):
-    window = bpy.context.window_manager.windows[0]
+    """Alt B in Rendered shading; in Solid shading and then back where Blender allows it only there, as 5.2 does."""
+    window, shading = bpy.context.window_manager.windows[0], area().spaces[0].shading
     with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        if not bpy.ops.view3d.clip_border.poll():
+            shading.type = 'SOLID'
         bpy.ops.view3d.clip_border(xmin=xmin, xmax=xmax, ymin=ymin, ymax=ymax)
+    shading.type = 'RENDERED'
     area().tag_redraw()  # as the end of the gesture does
 
 
@@ -75,19 +80,27 @@ def toggle_local_view():
 
 
 def screenshot(name):
-    """The view's pixels as shown, (height, width, 4) 0..1, row 0 at the bottom."""
-    path = os.path.join(KEEP or str(SCRATCH), f"{name}.png")
+    """The view's pixels on the screen, (height, width, 3) 0..1, row 0 at the bottom. Draws the window once more before."""
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
         bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
-        bpy.ops.screen.screenshot(filepath=path)
-    image = bpy.data.images.load(path)
-    width, height = image.size
-    pixels = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    bpy.data.images.remove(image)
     region = window_region()
-    return pixels.reshape(height, width, 4)[region.y:region.y + region.height, region.x:region.x + region.width]
+    picture = screen.settled_pixels()[region.y:region.y + region.height, region.x:region.x + region.width]
+    keep(name, picture)
+    return picture.astype(np.float32) / np.float32(255)
+
+
+def whole_window(name):
+    """Writes the first window's pixels to the folder that PATINA_SCREENSHOTS names."""
+    if KEEP:
+        bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
+        keep(name, screen.settled_pixels())
+
+
+def keep(name, picture):
+    """Writes (height, width, 3) uint8 to the folder that PATINA_SCREENSHOTS names."""
+    if KEEP:
+        screen.write_png(os.path.join(KEEP, f"{name}.png"), picture)
 
 
 def invoke_import(path, **options):
