@@ -21,7 +21,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from . import backdrop, dots, mattes, native, pace, render, sky, streaming, sync
+from . import backdrop, dots, graphics, mattes, native, pace, render, sky, streaming, sync
 from .jobs import Pause, Steps
 from .native.points import highlight
 from .sync import analysis, edits
@@ -177,7 +177,13 @@ class Viewport:
             self._ask(self.pace.level, pace.MOVING if self._many else pace.EXACT)
         self._await_size()
         if self.shown:
-            self._draw_picture(context)
+            try:
+                self._draw_picture(context)
+            finally:  # what Blender draws next needs this, also after an error
+                gpu.state.color_mask_set(True, True, True, True)
+                gpu.state.depth_test_set('NONE')
+                gpu.state.depth_mask_set(False)
+                gpu.state.blend_set('NONE')
         return self._status()
 
     def _await_size(self) -> None:
@@ -279,7 +285,7 @@ class Viewport:
             same = self._drawn and self._drawn[0].depth is self.shown.depth
             self._drawn = (self.shown, _upload(self.shown), self._drawn[2] if same else None)
         if overlays and self._drawn[2] is None:
-            self._drawn = (*self._drawn[:2], _texture(_covering(self.shown.depth), 'R32F'))
+            self._drawn = (*self._drawn[:2], graphics.texture(_covering(self.shown.depth), 'R32F'))
         shown, color, depth = self._drawn
         corners = [2.0 * share - 1.0 for share in shown.place]
         gpu.state.depth_test_set('NONE')
@@ -300,9 +306,6 @@ class Viewport:
             _fill_rectangle(corners, 'DEPTH', depth, cover=cover * shown.pixel, rounding=math.copysign(ROUNDING, cover),
                             away=context.region_data.view_matrix.translation.length, projection=(
                                 projection[2][2], projection[2][3], near, camera.orthographic))
-            gpu.state.color_mask_set(True, True, True, True)
-            gpu.state.depth_test_set('NONE')
-            gpu.state.depth_mask_set(False)
 
     # ---- the work
 
@@ -526,7 +529,7 @@ _VIEWPORTS: set[Viewport] = set()
 # Those with something to do; the first one works. One at a time: frames of a device take turns anyway, and clouds may
 # only get new colours while no picture of them is drawn.
 _TURNS: deque[Viewport] = deque()
-_compiled: dict[str, gpu.types.GPUShader] = {}  # by what they draw
+_compiled = graphics.Shaders()  # by what they draw
 
 
 def of_area(area: bpy.types.Area) -> Viewport | None:
@@ -547,7 +550,7 @@ def close_all() -> None:
         viewport.close()
     ANALYSES.clear()
     CHECKS.clear()
-    _compiled.clear()
+    _compiled.forget()
     sky.forget()
     sync.world.forget()
 
@@ -597,13 +600,7 @@ def _redraw(area_pointer: int, region_pointer: int, panels: bool) -> bool:
 
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:
-    return _texture(shown.color, 'RGBA16F')  # as it is: what is too bright is cut in the shader
-
-
-def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
-    height, width = pixels.shape[:2]
-    flat = np.ascontiguousarray(pixels, np.float32).reshape(-1)
-    return gpu.types.GPUTexture((width, height), format=kind, data=gpu.types.Buffer('FLOAT', flat.size, flat))
+    return graphics.texture(shown.color, 'RGBA16F')  # as it is: what is too bright is cut in the shader
 
 
 def _selects_vertices(context: bpy.types.Context) -> bool:
@@ -682,23 +679,25 @@ def _fill_rectangle(corners: list[float], kind: str, texture: gpu.types.GPUTextu
 
 
 def _shader(kind: str) -> gpu.types.GPUShader:
-    if kind not in _compiled:
-        interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")
-        interface.smooth('VEC2', "place")
-        info = gpu.types.GPUShaderCreateInfo()
-        info.define(kind)
-        if kind == 'DEPTH':
-            info.push_constant('VEC4', "projection")
-            for name in ("cover", "rounding", "away"):
-                info.push_constant('FLOAT', name)
-            if hasattr(info, "depth_write"):
-                info.depth_write('ANY')
-        info.sampler(0, 'FLOAT_2D', "picture")
-        info.vertex_in(0, 'VEC2', "pos")
-        info.vertex_in(1, 'VEC2', "uv")
-        info.vertex_out(interface)
-        info.fragment_out(0, 'VEC4', "color")
-        info.vertex_source(_VERTEX)
-        info.fragment_source(_FRAGMENT)
-        _compiled[kind] = gpu.shader.create_from_info(info)
-    return _compiled[kind]
+    return _compiled.get(kind, lambda: _create(kind))
+
+
+def _create(kind: str) -> gpu.types.GPUShader:
+    interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")
+    interface.smooth('VEC2', "place")
+    info = gpu.types.GPUShaderCreateInfo()
+    info.define(kind)
+    if kind == 'DEPTH':
+        info.push_constant('VEC4', "projection")
+        for name in ("cover", "rounding", "away"):
+            info.push_constant('FLOAT', name)
+        if hasattr(info, "depth_write"):
+            info.depth_write('ANY')
+    info.sampler(0, 'FLOAT_2D', "picture")
+    info.vertex_in(0, 'VEC2', "pos")
+    info.vertex_in(1, 'VEC2', "uv")
+    info.vertex_out(interface)
+    info.fragment_out(0, 'VEC4', "color")
+    info.vertex_source(_VERTEX)
+    info.fragment_source(_FRAGMENT)
+    return gpu.shader.create_from_info(info)
