@@ -14,7 +14,7 @@ bl_info = {  # for Blender 3.4 to 4.1; later ones read blender_manifest.toml
 import bpy
 from bpy.app.handlers import persistent
 
-from . import engine, histogram, migrate, operators, overlays, pairs, preferences, properties, render, ui, viewport
+from . import engine, histogram, migrate, operators, overlays, pairs, preferences, properties, render, ui, versions, viewport
 from .sync import clouds, files, images, meshes
 
 _MODULES = (preferences, properties, files, migrate, pairs, overlays, engine, operators, ui)
@@ -42,6 +42,7 @@ def register() -> None:
     bpy.app.handlers.load_pre.append(_forget)
     for handlers in _UNDO:
         handlers.append(_undone)
+    versions.tell()
 
 
 def unregister() -> None:

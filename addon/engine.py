@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import cryptomatte, native, passes, render, streaming, sync, viewport
+from . import cryptomatte, graphics, native, passes, render, streaming, sync, viewport
 from .importers import told
 from .sync import losses, motion
 from .sync.kept import CHECKS
@@ -213,7 +213,7 @@ def _summary(picture: render.Picture, ms: float, kept: str) -> str:
 
 def _text(error: Exception) -> str:
     """A sentence for the artist; a bug of ours must not reach Blender's console as a traceback."""
-    if isinstance(error, (native.PatinaError, sync.CameraError)):
+    if isinstance(error, (native.PatinaError, sync.CameraError, graphics.GraphicsError)):
         return str(error)
     where = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy.types import AddonPreferences, Context
 
-from . import memory, readers
+from . import memory, readers, versions
 from .properties.automatic import switch
 
 GIGA = 1 << 30
@@ -89,12 +89,14 @@ class PatinaPreferences(AddonPreferences):
         name="Allow Online Access", default=False,
         description="Fetch points from addresses that you open. From Blender 4.2 on its own setting, under System, holds")
 
-    def draw(self, _context: Context) -> None:
+    def draw(self, context: Context) -> None:
         from .operators import preferences as operators  # which needs these
         from .ui import rows
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
+        if untested := versions.notice():
+            rows.sentence(context, layout, untested, 'INFO')
         column = layout.column()
         column.label(text="Caches")
         column.prop(self, "cache_folder")

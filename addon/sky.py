@@ -8,6 +8,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
+from . import graphics
 from .sync import Camera, World
 from .sync.world_nodes import Picture
 
@@ -45,12 +46,11 @@ void main()
 }
 """
 
-_shader: gpu.types.GPUShader | None = None
+_compiled = graphics.Shaders()
 
 
 def forget() -> None:
-    global _shader
-    _shader = None
+    _compiled.forget()
 
 
 class Sky:
@@ -72,7 +72,7 @@ class Sky:
         x0, y0, x1, y1 = place
         across, up = camera.right - camera.left, camera.top - camera.bottom
         window = (camera.left + x0 * across, camera.bottom + y0 * up, camera.left + x1 * across, camera.bottom + y1 * up)
-        shader = _compiled()
+        shader = _compiled.get("sky", _create)
         left, low, right, high = window
         batch = batch_for_shader(shader, 'TRI_STRIP', {"pos": ((left, low), (right, low), (left, high), (right, high))})
         shader.bind()
@@ -89,24 +89,20 @@ def _texture(pixels: np.ndarray) -> gpu.types.GPUTexture:
     height, width = pixels.shape[:2]
     whole = np.ones((height, width, 4), np.float32)
     np.minimum(pixels, 65000.0, out=whole[..., :3])  # half floats end at 65504
-    flat = whole.reshape(-1)
-    return gpu.types.GPUTexture((width, height), format='RGBA16F', data=gpu.types.Buffer('FLOAT', flat.size, flat))
+    return graphics.texture(whole, 'RGBA16F')
 
 
-def _compiled() -> gpu.types.GPUShader:
-    global _shader
-    if _shader is None:
-        interface = gpu.types.GPUStageInterfaceInfo("patina_sky")
-        interface.smooth('VEC2', "place")
-        info = gpu.types.GPUShaderCreateInfo()
-        info.push_constant('MAT4', "turn")
-        for name in ("window", "corners", "gain", "kinds"):
-            info.push_constant('VEC4', name)
-        info.sampler(0, 'FLOAT_2D', "picture")
-        info.vertex_in(0, 'VEC2', "pos")
-        info.vertex_out(interface)
-        info.fragment_out(0, 'VEC4', "color")
-        info.vertex_source(_VERTEX)
-        info.fragment_source(_FRAGMENT)
-        _shader = gpu.shader.create_from_info(info)
-    return _shader
+def _create() -> gpu.types.GPUShader:
+    interface = gpu.types.GPUStageInterfaceInfo("patina_sky")
+    interface.smooth('VEC2', "place")
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant('MAT4', "turn")
+    for name in ("window", "corners", "gain", "kinds"):
+        info.push_constant('VEC4', name)
+    info.sampler(0, 'FLOAT_2D', "picture")
+    info.vertex_in(0, 'VEC2', "pos")
+    info.vertex_out(interface)
+    info.fragment_out(0, 'VEC4', "color")
+    info.vertex_source(_VERTEX)
+    info.fragment_source(_FRAGMENT)
+    return gpu.shader.create_from_info(info)

@@ -22,7 +22,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from mathutils import Color
 
-from . import backdrop, cryptomatte, dots, mattes, native, overlays, pace, render, sky, streaming, sync
+from . import backdrop, cryptomatte, dots, graphics, mattes, native, overlays, pace, render, sky, streaming, sync
 from .jobs import Pause, Steps
 from .native.points import highlight
 from .sync import analysis, edits
@@ -183,7 +183,13 @@ class Viewport:
             self._ask(self.pace.level, pace.MOVING if self._many else pace.EXACT)
         self._await_size()
         if self.shown:
-            self._draw_picture(context)
+            try:
+                self._draw_picture(context)
+            finally:  # what Blender draws next needs this, also after an error
+                gpu.state.color_mask_set(True, True, True, True)
+                gpu.state.depth_test_set('NONE')
+                gpu.state.depth_mask_set(False)
+                gpu.state.blend_set('NONE')
         return self._status()
 
     def _await_size(self) -> None:
@@ -285,7 +291,7 @@ class Viewport:
             same = self._drawn and self._drawn[0].depth is self.shown.depth
             self._drawn = (self.shown, _upload(self.shown), self._drawn[2] if same else None)
         if shows_overlays and self._drawn[2] is None:
-            self._drawn = (*self._drawn[:2], _texture(_covering(self.shown.hiding), 'R32F'))
+            self._drawn = (*self._drawn[:2], graphics.texture(_covering(self.shown.hiding), 'R32F'))
         shown, color, _ = self._drawn
         corners = [2.0 * share - 1.0 for share in shown.place]
         gpu.state.depth_test_set('NONE')
@@ -327,12 +333,15 @@ class Viewport:
         """After Blender has drawn the overlays."""
         if self._closed or self._drawn is None or self._drawn[2] is None:
             return
-        if not overlays.KEEPS_DEPTH:
-            gpu.state.blend_set('NONE')
-            self._hide_overlays(context, 'ERASE')
-            overlays.draw_marks(context)
-        if self._chosen is not None and len(self._chosen):
-            self._draw_chosen(context)
+        try:
+            if not overlays.KEEPS_DEPTH:
+                gpu.state.blend_set('NONE')
+                self._hide_overlays(context, 'ERASE')
+                overlays.draw_marks(context)
+            if self._chosen is not None and len(self._chosen):
+                self._draw_chosen(context)
+        except graphics.GraphicsError as error:
+            self.message = str(error)
 
     def _draw_chosen(self, context: bpy.types.Context) -> None:
         """Vertices that are selected in Edit Mode, on the side that is seen."""
@@ -589,7 +598,7 @@ _VIEWPORTS: set[Viewport] = set()
 # Those with something to do; the first one works. One at a time: frames of a device take turns anyway, and clouds may
 # only get new colours while no picture of them is drawn.
 _TURNS: deque[Viewport] = deque()
-_compiled: dict[str, gpu.types.GPUShader] = {}  # by what they draw
+_compiled = graphics.Shaders()  # by what they draw
 
 
 def of_area(area: bpy.types.Area) -> Viewport | None:
@@ -610,7 +619,7 @@ def close_all() -> None:
         viewport.close()
     ANALYSES.clear()
     CHECKS.clear()
-    _compiled.clear()
+    _compiled.forget()
     sky.forget()
     sync.world.forget()
 
@@ -660,13 +669,7 @@ def _redraw(area_pointer: int, region_pointer: int, panels: bool) -> bool:
 
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:
-    return _texture(shown.color, 'RGBA16F')  # as it is: what is too bright is cut in the shader
-
-
-def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
-    height, width = pixels.shape[:2]
-    flat = np.ascontiguousarray(pixels, np.float32).reshape(-1)
-    return gpu.types.GPUTexture((width, height), format=kind, data=gpu.types.Buffer('FLOAT', flat.size, flat))
+    return graphics.texture(shown.color, 'RGBA16F')  # as it is: what is too bright is cut in the shader
 
 
 def _covering(depth: np.ndarray) -> np.ndarray:
@@ -780,29 +783,31 @@ def _fill_rectangle(corners: list[float], kind: str, texture: gpu.types.GPUTextu
 
 
 def _shader(kind: str) -> gpu.types.GPUShader:
-    if kind not in _compiled:
-        info = gpu.types.GPUShaderCreateInfo()
-        info.define(kind)
-        if kind in {'DEPTH', 'ERASE', 'CHOSEN'}:
-            info.push_constant('VEC4', "projection")
-            for name in ("cover", "rounding", "away") if kind != 'CHOSEN' else ():
-                info.push_constant('FLOAT', name)
-            if hasattr(info, "depth_write") and kind != 'CHOSEN':
-                info.depth_write('ANY')
-        info.sampler(0, 'FLOAT_2D', "picture")
-        if kind == 'CHOSEN':
-            info.push_constant('MAT4', "transform")  # with the others 128 bytes, which all devices allow
-            for name in ("offset", "region", "tint"):
-                info.push_constant('VEC4', name)
-            info.vertex_in(0, 'VEC3', "pos")
-        else:
-            interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")
-            interface.smooth('VEC2', "place")
-            info.vertex_in(0, 'VEC2', "pos")
-            info.vertex_in(1, 'VEC2', "uv")
-            info.vertex_out(interface)
-        info.fragment_out(0, 'VEC4', "color")
-        info.vertex_source(_DEPTH + _VERTEX if kind == 'CHOSEN' else _VERTEX)
-        info.fragment_source(_FRAGMENT if kind == 'CHOSEN' else _DEPTH + _FRAGMENT)
-        _compiled[kind] = gpu.shader.create_from_info(info)
-    return _compiled[kind]
+    return _compiled.get(kind, lambda: _create(kind))
+
+
+def _create(kind: str) -> gpu.types.GPUShader:
+    info = gpu.types.GPUShaderCreateInfo()
+    info.define(kind)
+    if kind in {'DEPTH', 'ERASE', 'CHOSEN'}:
+        info.push_constant('VEC4', "projection")
+        for name in ("cover", "rounding", "away") if kind != 'CHOSEN' else ():
+            info.push_constant('FLOAT', name)
+        if hasattr(info, "depth_write") and kind != 'CHOSEN':
+            info.depth_write('ANY')
+    info.sampler(0, 'FLOAT_2D', "picture")
+    if kind == 'CHOSEN':
+        info.push_constant('MAT4', "transform")  # with the others 128 bytes, which all devices allow
+        for name in ("offset", "region", "tint"):
+            info.push_constant('VEC4', name)
+        info.vertex_in(0, 'VEC3', "pos")
+    else:
+        interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")
+        interface.smooth('VEC2', "place")
+        info.vertex_in(0, 'VEC2', "pos")
+        info.vertex_in(1, 'VEC2', "uv")
+        info.vertex_out(interface)
+    info.fragment_out(0, 'VEC4', "color")
+    info.vertex_source(_DEPTH + _VERTEX if kind == 'CHOSEN' else _VERTEX)
+    info.fragment_source(_FRAGMENT if kind == 'CHOSEN' else _DEPTH + _FRAGMENT)
+    return gpu.shader.create_from_info(info)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import blf
-import bpy
 from bpy.types import Context, PropertyGroup, UILayout
 
 
@@ -32,7 +31,7 @@ _PAD, _ICON = 10, 20  # around a label's text, before it
 def text_width(context: Context, text: str) -> float:
     """Pixels at a resolution scale of 1, as the interface writes it."""
     points = context.preferences.ui_styles[0].widget.points
-    blf.size(0, points, *(() if bpy.app.version >= (3, 5, 0) else (72,)))
+    blf.size(0, points)
     return blf.dimensions(0, text)[0]
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from .. import pace, viewport
+from .. import pace, versions, viewport
 from ..engine import PatinaRenderEngine
 from ..operators import set_up
 from ..sync.analyzing import ANALYSES
@@ -59,6 +59,8 @@ class PATINA_PT_statistics(SidebarPanel, Panel):
 
     def draw(self, context: Context) -> None:
         layout = self.layout
+        if untested := versions.notice():
+            rows.sentence(context, layout, untested, 'INFO')
         found = viewport.of_area(context.area)
         if found and found.message:
             rows.sentence(context, layout, found.message, 'ERROR')

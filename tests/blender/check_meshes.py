@@ -89,7 +89,8 @@ def test_materials_and_smooth_shading():
     scene = scene_with_points('TRIANGLES')
     bpy.data.objects.remove(bpy.data.objects["points"])
     scene.world = bpy.data.worlds.new("white")
-    scene.world.use_nodes = False
+    if bpy.app.version < (5, 0, 0):
+        scene.world.use_nodes = False
     scene.world.color = (1, 1, 1)
     mesh = bpy.data.meshes.new("strip")
     mesh.from_pydata([(-1, -1, -4), (0, -1, -3), (1, -1, -4), (-1, 1, -4), (0, 1, -3), (1, 1, -4)], [],

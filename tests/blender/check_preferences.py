@@ -2,19 +2,22 @@
 """The add-on's preferences: readers of LAZ and E57 from files and by pip, the cache, defaults of device, threads and memory."""
 
 import contextlib
+import io
 import shutil
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 from unittest import mock
 
 import bpy
 import check_linked  # noqa: F401  no test leaves files with the user
 from check_import import import_ply
 from check_linked import dense
+from check_panels import Row, context_of, drawn_by
 from harness import REPOSITORY, SCRATCH, Skip, check, new_scene, render
-from patina import importers, memory, native, preferences, readers
+from patina import importers, memory, native, preferences, readers, tested, versions
 from patina.operators import preferences as operators
 from patina.sync import cache, kept, linked, settings
 
@@ -237,3 +240,22 @@ def test_manual_is_there():
     path = operators.manual()
     check(path is not None and path.read_text("utf-8").startswith("# The manual"), f"{path}")
     check(any(draw.__module__ == operators.__name__ for draw in bpy.types.TOPBAR_MT_help._dyn_ui_initialize()), "not in the menu Help")
+
+
+def test_a_newer_blender_is_told_of():
+    """Once in the console, in the preferences and in the sidebar; not if this version was tested."""
+    this = bpy.app.version[:2]
+    with mock.patch.object(tested, "NEWEST", this):
+        check(not versions.notice(), versions.notice())
+    with mock.patch.object(tested, "NEWEST", (3, 3)), contextlib.redirect_stdout(io.StringIO()) as said:
+        versions.tell()
+        check(said.getvalue().count("\n") == 1 and "3.3" in said.getvalue() and f"{this[0]}.{this[1]}" in said.getvalue(), said.getvalue())
+        new_scene()
+        labels = [text for kind, _, _, text in drawn_by(bpy.types.PATINA_PT_statistics, context_of()) if kind == "label"]
+        check(versions.notice() in " ".join(labels), f"the sidebar: {labels}")
+        with enabled() as known:
+            layout = Row()
+            drawn = SimpleNamespace(layout=layout, bl_rna=known.bl_rna, **{name: getattr(known, name) for name in known.__annotations__})
+            preferences.PatinaPreferences.draw(drawn, context_of())
+        labels = [text for kind, _, _, text in layout.drawn if kind == "label"]
+        check(versions.notice() in " ".join(labels), f"the preferences: {labels}")

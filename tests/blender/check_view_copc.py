@@ -8,20 +8,11 @@ from pathlib import Path
 import numpy as np
 from check_copc import import_copc, in_a_hurry, made, open_address
 from check_formats import with_laspy
-from harness import Skip, check
+from harness import check
 from mathutils import Quaternion
 from patina import streaming, viewport
 from patina.sync import clouds
 from window import area, setup, shown, view
-
-
-def skip_without_laspy():
-    try:
-        with_laspy()
-    except Skip as reason:
-        print(f"  skipped: {reason}")
-        return True
-    return False
 
 
 def there():
@@ -40,8 +31,7 @@ def quiet(least=1):
 
 
 def test_copc_grows_sharper():
-    if skip_without_laspy():
-        return
+    with_laspy()
     start = time.perf_counter()
     path, entries, _ = made("window.copc.laz", 120000)
     print(f"  written in {time.perf_counter() - start:.1f} s")
@@ -65,8 +55,7 @@ def test_copc_grows_sharper():
 
 def test_copc_from_a_slow_server():
     """The line says what is on its way; moving waits for nothing."""
-    if skip_without_laspy():
-        return
+    with_laspy()
     path, _, _ = made("slow-window.copc.laz", 60000)
     clouds.CACHE.clear()
     server = subprocess.Popen([streaming._python(), str(Path(__file__).with_name("range_server.py")), str(path), "slower"],
@@ -107,8 +96,7 @@ def test_copc_from_a_slow_server():
 
 def test_copc_of_a_server_that_goes_away():
     """One message that names the address and the page; the last good picture stays."""
-    if skip_without_laspy():
-        return
+    with_laspy()
     path, _, _ = made("gone-window.copc.laz", 60000)
     clouds.CACHE.clear()
     server = subprocess.Popen([streaming._python(), str(Path(__file__).with_name("range_server.py")), str(path), "slower"],

@@ -9,12 +9,13 @@ import threading
 import time
 
 import bpy
+import gpu
 import numpy as np
 from check_import import import_ply as import_points
 from check_linked import dense
-from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, patina, sphere
+from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, patina, render, sphere
 from mathutils import Quaternion
-from patina import histogram, pace, viewport
+from patina import graphics, histogram, pace, viewport
 from patina.importers import las
 from patina.sync.analyzing import ANALYSES
 from window import area, invoke_import, newer, screenshot, settled, setup, shown, view, window_region
@@ -306,6 +307,36 @@ def test_failure_is_said():
     check(found.shown is picture, "the last good picture went")
     before = found.pictures
     view().view_rotation = Quaternion((0, 1, 0), 0.6)
+    yield newer(before)
+    check(not found.message, found.message)
+
+
+def test_graphics_that_lack_something():
+    """One message that names Blender's backend and says what works; a shader that failed is not compiled with each redraw."""
+    setup(overlays=True)
+    add_points(*sphere(5000, 1.0, (0, 0, 0)))
+    yield lambda: shown() is not None
+    found, tried, create = shown(), [], gpu.shader.create_from_info
+
+    def failing(info):
+        tried.append(info)
+        raise Exception("Shader Compile Error, see console for more details")
+
+    viewport._compiled.forget()
+    gpu.shader.create_from_info = failing
+    try:
+        for turn in (0.5, 0.6, 0.7):
+            before = found.pictures
+            view().view_rotation = Quaternion((0, 1, 0), turn)
+            yield lambda before=before: found.pictures > before and "Shader Compile Error" in found.message
+        check(graphics.name() in found.message and "F12" in found.message, found.message)
+        check(len(tried) <= 2, f"compiled {len(tried)} times")
+        check(render()["Combined"].any(), "F12 shows nothing")
+    finally:
+        gpu.shader.create_from_info = create
+        viewport._compiled.forget()
+    before = found.pictures
+    view().view_rotation = Quaternion((0, 1, 0), 0.8)
     yield newer(before)
     check(not found.message, found.message)
 

@@ -3,9 +3,11 @@
 
 import atexit
 import os
+import re
 import shutil
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 
 import bpy
@@ -15,6 +17,29 @@ from mathutils import Matrix, Vector
 REPOSITORY = Path(__file__).resolve().parents[2]
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-test-"))
 atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
+
+
+OURS = re.compile(r"(patina|check_\w+|harness|window|screen|figures|session_rounds|copc_files|ept_files|range_server|test_\w+)(\.|$)")
+deprecated: list[str] = []  # what our modules used that Blender or Python deprecates, since the last take_deprecated()
+_showwarning = warnings.showwarning
+
+
+def _record_warning(message, category, filename, lineno, file=None, line=None):
+    """Also in callbacks, where an exception would only be printed."""
+    if issubclass(category, DeprecationWarning):
+        deprecated.append(f"{message} ({Path(filename).name}:{lineno})")
+    _showwarning(message, category, filename, lineno, file, line)
+
+
+def take_deprecated():
+    """What was recorded, as one text without repetitions."""
+    found = "; ".join(dict.fromkeys(deprecated))
+    deprecated.clear()
+    return found
+
+
+warnings.filterwarnings("always", category=DeprecationWarning, module=OURS.pattern)
+warnings.showwarning = _record_warning
 
 
 class Skip(Exception):
@@ -208,6 +233,12 @@ def linear(bytes_):
 def drawn(picture):
     """(row, column) of every pixel that is not background, as a set."""
     return {tuple(place) for place in np.argwhere(picture["Combined"][..., 3] > 0).tolist()}
+
+
+def check_deprecated():
+    """Fails if a test used what Blender or Python deprecates: it will be gone in a later version."""
+    found = take_deprecated()
+    check(not found, f"deprecated: {found}")
 
 
 def check(condition, message):

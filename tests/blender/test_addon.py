@@ -38,8 +38,10 @@ SLOW = ("analysis/beside", "analysis/cancel", "analysis/final_takes_over", "anal
         "roles/beside_cycles", "roles/shadow_catcher", "samples/panoramas_sample_by_sample", "styles/save_and_load",
         "styles/shipped_files_say_just_what_differs", "styles/thumbnails_are_of_today", "textures/opacity",
         "textures/points_shadow_triangles", "world/baked_skies_like_cycles", "world/light_like_cycles", "world/nodes_like_cycles")
-CHOICES = {"--some": (lambda label: label.startswith(ONCE), "no version of Blender changes them; Debian's runs them, and the newest that has readers"),
-           "--quick": (lambda label: label in SLOW, "they take long, and build/test runs them")}
+# What an option leaves out, why, and what it runs.
+CHOICES = {"--some": (lambda label: label.startswith(ONCE), "no version of Blender changes them; Debian's runs them, and the newest that has readers",
+                      "those that depend on Blender's version"),
+           "--quick": (lambda label: label in SLOW, "they take long, and build/test runs them", "quick ones")}
 
 
 def wanted_names():
@@ -64,10 +66,14 @@ def work():
 
 def main():
     import harness
+    import setting
     names = wanted_names()
     left_out = {name: [] for name in names if name in CHOICES}
     part, parts = next((map(int, name[len("--part="):].split("/")) for name in names if name.startswith("--part=")), (1, 1))
     names = [name for name in names if not name.startswith("--")]
+    kinds = {(): "background tests", ("gpu_",): "tests of the viewport's shaders"}
+    setting.say(", ".join([kinds.get(tuple(names), "named tests"), *(CHOICES[choice][2] for choice in left_out)]), (part, parts),
+                whole=tuple(names) in kinds)
     passed = failed = skipped = 0
     labels, took = [], []
     for place, module in enumerate(map(importlib.import_module, MODULES)):  # all, in each part
@@ -86,6 +92,7 @@ def main():
             start, before = time.perf_counter(), work()
             try:
                 test()
+                harness.check_deprecated()
             except harness.Skip as reason:
                 skipped += 1
                 print(f"skip {label}: {reason}", flush=True)

@@ -150,6 +150,9 @@ def test_remove():
 
 
 def main():
+    sys.path.insert(0, str(Path(__file__).resolve().parent))
+    import setting
+    setting.say("the package, installed")
     passed = failed = 0
     for test in (test_says_what_it_does, test_install, test_nothing_is_loaded, test_render, test_remove):
         try:
