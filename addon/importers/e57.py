@@ -17,9 +17,6 @@ from . import scans
 from .crs import units
 from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
 
-MISSING = ("E57 files need the Python package pye57: Install Readers in the add-on's preferences fetches it (Patina's extension for "
-           "Blender 4.2 and later brings it)")
-
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 CELLS = 1 << 24  # a grid's rows or columns: more are no whole numbers in float32
 
@@ -46,11 +43,13 @@ class Pose:
 
 
 def _open(path: Path) -> Any:
+    if readers.lacks("pye57"):
+        raise native.PatinaError(f"{path.name}: {readers.how_to('E57')}", -5)
     try:
         readers.load("pye57")
         import pye57
     except ImportError:
-        raise native.PatinaError(MISSING, -5) from None
+        raise native.PatinaError(f"{path.name}: {readers.how_to('E57')}", -5) from None
     try:
         return pye57.E57(str(path))
     except Exception as error:  # libE57 throws its own kinds
