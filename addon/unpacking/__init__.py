@@ -136,7 +136,8 @@ class Unpacker:
 
     def take(self, slot: int, size: int) -> bytearray:
         """A copy of a slot's first bytes. The process may use the slot again."""
-        found = bytearray(self._map[slot * self._size:slot * self._size + size])
+        with memoryview(self._map) as whole, whole[slot * self._size:slot * self._size + size] as part:
+            found = bytearray(part)
         self.tell({"free": slot})
         return found
 
