@@ -123,19 +123,19 @@ class PatinaPreferences(AddonPreferences):
         if not hasattr(bpy.app, "online_access"):
             column.prop(self, "online")
         column = layout.column()
-        lacking = readers.missing()
-        if lacking:
-            column.label(text=f"Not there: {', '.join(lacking)}", icon='INFO')
+        column.label(text="Formats")
+        for line, there in readers.status():
+            column.label(text=line, icon='CHECKMARK' if there else 'INFO')
+        if readers.missing():
             row = column.row()
             row.operator("patina.install_readers")
             row.operator("patina.install_reader_files")
-        else:
-            column.label(text="LAZ, COPC and E57 can be read", icon='CHECKMARK')
         layout.operator("patina.open_manual", icon='HELP')
 
 
 def register() -> None:
     bpy.utils.register_class(PatinaPreferences)
+    readers.look_in(Path(__file__).parent / "packages")  # of the zip for Blender 3.4 to 4.1; later ones install wheels
     readers.look_in(readers_folder())
     known = get()
     if known:
@@ -144,5 +144,6 @@ def register() -> None:
 
 def unregister() -> None:
     readers.look_no_more_in(readers_folder())
+    readers.look_no_more_in(Path(__file__).parent / "packages")
     bpy.utils.unregister_class(PatinaPreferences)
     memory.limit = 0

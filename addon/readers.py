@@ -1,21 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The packages that read LAZ and E57, which are no part of the zip for Blender 3.4 to 4.1: what lacks, and how they come here.
+"""The packages that read LAZ and E57: which are missing, and how to install them. Each is optional: the add-on works without.
 
-They lie in a folder of their own, one a Python, at the end of where Python looks: nobody else's packages change. Blender's
-Python takes nothing from the user's, and on many systems pip must not touch the system's. Nothing here knows Blender. What only
-installing needs is imported by it, for Blender's start waits for this module.
+The zips contain laspy and lazrs, with lazrs compiled for each Python in BROUGHT. pye57 is installed on request. What is installed goes
+to a folder of its own for each Python, at the end of Python's search path, so that nobody else's packages change. Blender's Python
+takes nothing from the user's, and on many systems pip must not touch the system's. Nothing here knows Blender. What only installing
+needs is imported there, because Blender's start waits for this module.
 """
 
 from __future__ import annotations
 
 import contextlib
 import importlib
+import importlib.machinery
 import importlib.util
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
-PACKAGES = {"laspy": "LAZ, COPC", "lazrs": "LAZ, COPC", "pye57": "E57", "pyquaternion": "E57"}  # by what they read
+BROUGHT = "3.10 to 3.14"  # Pythons that the zip's lazrs is compiled for
+COMPILED = {"lazrs": "lazrs", "pye57": "libe57"}  # their modules that are compiled for one Python
+
+PACKAGES = {"lazrs": "LAZ and COPC", "laspy": "EPT", "pye57": "E57", "pyquaternion": "E57"}  # by what they read
+
+# What can be done where no wheel exists.
+WITHOUT = "Convert LAZ files to LAS, and E57 files to PLY or LAS, with another program; these are read without packages"
 
 TAG = f"cp{sys.version_info[0]}{sys.version_info[1]}"
 
@@ -25,18 +33,47 @@ class ReadersError(Exception):
 
 
 def missing() -> list[str]:
-    """Packages that Python does not find."""
-    found = []
-    for name in PACKAGES:
-        with contextlib.suppress(ImportError, ValueError):
-            if importlib.util.find_spec(name):
-                continue
-        found.append(name)
-    return found
+    """Packages that this Python does not find, or finds only for other Pythons."""
+    return [name for name in PACKAGES if not _there(name)]
+
+
+def _there(name: str) -> bool:
+    with contextlib.suppress(ImportError, ValueError):
+        found = importlib.util.find_spec(name)
+        if found is None:
+            return False
+        if name not in COMPILED or found.submodule_search_locations is None:
+            return True
+        return any((Path(place) / (COMPILED[name] + suffix)).is_file()
+                   for place in found.submodule_search_locations for suffix in importlib.machinery.EXTENSION_SUFFIXES)
+    return False
 
 
 def lacks(*names: str) -> bool:
     return any(name in names for name in missing())
+
+
+def status() -> list[tuple[str, bool]]:
+    """A line for each group of formats, for the preferences, and whether it can be read."""
+    lines, lacking = [], missing()
+    for formats in dict.fromkeys(PACKAGES.values()):
+        needed = [name for name in PACKAGES if PACKAGES[name] == formats]
+        absent = [name for name in needed if name in lacking]
+        lines.append((f"{formats}: needs the Python package{'s' * (len(absent) > 1)} {' and '.join(absent)}" if absent else
+                      f"{formats}: can be read", not absent))
+    return lines
+
+
+def how_to(formats: str) -> str:
+    """What to do where a file of these formats cannot be read."""
+    absent = [name for name in missing() if PACKAGES[name] == formats] or [name for name in PACKAGES if PACKAGES[name] == formats]
+    brought = (f" Patina's zip contains them for Python {BROUGHT}; this Blender has Python {_python()}." if "lazrs" in absent else "")
+    return (f"{formats} files need the Python package{'s' * (len(absent) > 1)} {' and '.join(absent)}.{brought} "
+            "Choose Install Readers in the add-on's preferences")
+
+
+def _python() -> str:
+    return f"{sys.version_info[0]}.{sys.version_info[1]}"
 
 
 def load(*names: str) -> None:
@@ -54,14 +91,17 @@ def load(*names: str) -> None:
 
 
 def wanted() -> list[str]:
-    """Names with versions, as pip takes them."""
-    return (Path(__file__).parent / "readers.txt").read_text("utf-8").split()
+    """The missing packages with their versions, as pip takes them; all of them if none is missing."""
+    every = (Path(__file__).parent / "readers.txt").read_text("utf-8").split()
+    lacking = missing()
+    return [line for line in every if line.partition("==")[0] in lacking] or every
 
 
 def look_in(folder: Path) -> None:
-    """From now on packages are looked for in the folder, after all other places."""
+    """Adds the folder to Python's search path: at the end, or first where a package is found elsewhere for other Pythons only."""
     if folder.is_dir() and str(folder) not in sys.path:
-        sys.path.append(str(folder))
+        broken = any((folder / name).is_dir() and not _there(name) and importlib.util.find_spec(name) for name in COMPILED)
+        sys.path.insert(0 if broken else len(sys.path), str(folder))
     importlib.invalidate_caches()
 
 
@@ -134,34 +174,50 @@ def _replace(item: Path, place: Path) -> None:
 
 
 def download(folder: Path, command: list[str] | None = None) -> Iterator[str]:
-    """Fetches the wheels into the folder with pip, which installs nothing; says again and again what it does. ReadersError when
-    there is no pip, or no way to PyPI. Closing it ends pip."""
-    import subprocess
-    import tempfile
+    """Fetches the wheels of the missing packages into the folder with pip, which installs nothing. Yields texts of what it does.
+    ReadersError when there is no pip or no way to PyPI, or when PyPI has none of the wheels for this Python. Closing it ends pip."""
     if command is None:
         if importlib.util.find_spec("pip") is None:
             raise ReadersError(f"this Blender's Python has no pip. {by_hand()}")
         command = [sys.executable, "-m", "pip"]
-    words = [*command, "download", "--disable-pip-version-check", "--progress-bar", "off", "--no-input", "--no-deps",
-             "--only-binary=:all:", "-d", str(folder), *wanted()]
-    text = tempfile.TemporaryFile()  # noqa: SIM115  a pipe that nobody reads would stop it
-    try:
-        pip = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=text, stderr=subprocess.STDOUT)
-    except OSError as error:
-        raise ReadersError(f"pip does not start: {error.strerror}. {by_hand()}") from None
-    try:
-        while pip.poll() is None:
-            done = len(list(folder.glob("*.whl")))
-            yield f"Fetching the readers of LAZ and E57, {done} of {len(wanted())}"
-        if pip.returncode:
+    names, none = wanted(), []
+    for index, name in enumerate(names):
+        words = [*command, "download", "--disable-pip-version-check", "--progress-bar", "off", "--no-input", "--no-deps",
+                 "--only-binary=:all:", "-d", str(folder), name]
+        told = yield from _pip(words, f"Fetching {name}, {index} of {len(names)}")
+        if "No matching distribution" in told:
+            none.append(name)
+        elif told:
+            raise ReadersError(f"pip: {told[:200]}. {by_hand()}")
+    if none:
+        yield f"No wheels of {', '.join(none)}"
+    if none == names:
+        raise ReadersError(f"PyPI has no wheel of {', '.join(none)} for Python {_python()} on this system yet. {WITHOUT}")
+
+
+def _pip(words: list[str], doing: str) -> Generator[str, None, str]:
+    """Runs pip and yields the text until it ends. Returns its last line if it failed, else an empty text."""
+    import subprocess
+    import tempfile
+    with tempfile.TemporaryFile() as text:  # a pipe that nobody reads would stop it
+        try:
+            pip = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=text, stderr=subprocess.STDOUT)
+        except OSError as error:
+            raise ReadersError(f"pip does not start: {error.strerror}. {by_hand()}") from None
+        try:
+            while pip.poll() is None:
+                yield doing
+            if not pip.returncode:
+                return ""
             text.seek(0)
-            last = [line for line in text.read().decode("utf-8", "replace").splitlines() if line.strip()][-1:]
-            raise ReadersError(f"pip: {''.join(last)[:200]}. {by_hand()}")
-    finally:
-        if pip.poll() is None:
-            pip.terminate()
-            pip.wait()
-        text.close()
+            lines = [line for line in text.read().decode("utf-8", "replace").splitlines() if line.strip()]
+            if any("Retrying" in line for line in lines):  # its last line then says that there is no such package
+                return "PyPI cannot be reached"
+            return "".join(lines[-1:]) or f"it ended with {pip.returncode}"
+        finally:
+            if pip.poll() is None:
+                pip.terminate()
+                pip.wait()
 
 
 def by_hand() -> str:

@@ -8,19 +8,18 @@ import dataclasses
 import math
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from .. import jobs, native, readers
+from .. import jobs, native, readers, unpacking
+from ..unpacking import e57_xml
 from . import scans
 from .crs import units
 from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
 
-MISSING = ("E57 files need the Python package pye57: Install Readers in the add-on's preferences fetches it (Patina's extension for "
-           "Blender 4.2 and later brings it)")
-
+PREVIEWED = 1 << 20  # bytes of XML that a preview reads
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
+MOST_WARNINGS = 8  # of one file
 CELLS = 1 << 24  # a grid's rows or columns: more are no whole numbers in float32
 
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
@@ -45,16 +44,52 @@ class Pose:
         return tuple(np.column_stack([turn, self.place]).ravel().tolist())
 
 
-def _open(path: Path) -> Any:
+class File:
+    """The head of an E57, and the process that unpacks its points, which starts with the first of them. Close it."""
+
+    def __init__(self, path: Path, head: e57_xml.Head) -> None:
+        self.path, self.head, self.scans = path, head, head.scans
+        self._process: unpacking.Unpacker | None = None
+        self._widest = max((len(_fields(scan)) for scan in self.scans), default=1) or 1
+        most = max((scan.points for scan in self.scans), default=1)
+        self._piece = max(1, min(SMALL_PIECE, most, unpacking.SLOT // (8 * self._widest)))  # points
+
+    def pieces(self, index: int, names: Collection[str]) -> Iterator[tuple[int, list[np.ndarray]] | None]:
+        """How many points, and the named fields of theirs, float64; None: nothing yet."""
+        if self._process is None:
+            self._process = unpacking.Unpacker(self.path, "e57", 8 * self._piece * self._widest, 32 * self.head.xml)
+        self._process.tell({"scan": index, "fields": list(names), "piece": self._piece})
+        for answer in self._process.answers():
+            if answer is None:
+                yield None
+            elif "slot" in answer:
+                count = answer["count"]
+                raw = np.frombuffer(self._process.take(answer["slot"], 8 * count * len(names)), np.float64)
+                yield count, [raw[at * count:(at + 1) * count] for at in range(len(names))]
+
+    def close(self) -> None:
+        if self._process:
+            self._process.close()
+
+
+def _open(path: Path) -> File:
+    if readers.lacks("pye57", "pyquaternion"):
+        raise native.PatinaError(f"{path.name}: {readers.how_to('E57')}", -5)
+    head = _head(path)
     try:
-        readers.load("pye57")
-        import pye57
-    except ImportError:
-        raise native.PatinaError(MISSING, -5) from None
+        e57_xml.check(path, head)
+    except e57_xml.E57Error as error:
+        raise native.PatinaError(f"{path.name}: {error}", -4) from None
+    return File(path, head)
+
+
+def _head(path: Path, most: int | None = None) -> e57_xml.Head:
     try:
-        return pye57.E57(str(path))
-    except Exception as error:  # libE57 throws its own kinds
-        raise native.PatinaError(f"{path.name}: cannot be read: {_first_line(error)}", -4) from None
+        return e57_xml.read(path, most)
+    except OSError as error:
+        raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror or error}", -3) from None
+    except e57_xml.E57Error as error:
+        raise native.PatinaError(f"{path.name}: {error}", -4) from None
 
 
 def _first_line(error: Exception) -> str:
@@ -62,13 +97,11 @@ def _first_line(error: Exception) -> str:
 
 
 def preview(path: Path) -> list[str]:
-    file = _open(path)
-    try:
-        headers = [file.get_header(index) for index in range(file.scan_count)]
-        return [f"E57, {len(headers)} scans", f"{sum(header.point_count for header in headers):,} points",
-                *sorted({field for header in headers for field in header.point_fields})]
-    finally:
-        file.close()
+    head = _head(path, PREVIEWED)
+    more = "" if head.whole else "more than "
+    return [f"E57, {more}{len(head.scans)} scans", f"{more}{sum(scan.points for scan in head.scans):,} points",
+            *(["cannot be read yet: choose Install Readers in the add-on's preferences"] * readers.lacks("pye57", "pyquaternion")),
+            *sorted({field.name for scan in head.scans for field in scan.fields})]
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
@@ -83,63 +116,72 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     poses: list[Pose] = []
     warnings: list[str] = []
     failed: native.PatinaError | None = None
-    done, read, index, crs = 0, 0, 0, ""
+    done, read, index = 0, 0, 0
     try:
-        crs = _crs(file)
-        headers = [file.get_header(index) for index in range(file.scan_count)]
-        total = max(sum(header.point_count for header in headers), 1)
-        for index, header in enumerate(headers):
+        total = max(sum(scan.points for scan in file.scans), 1)
+        for index, scan in enumerate(file.scans):
             what = f"{path.name}: scan {index}"
-            pose, wrong = _pose(header)
-            stations.append(_station(header, pose))
+            pose, wrong = _pose(scan)
+            stations.append(_station(scan, pose))
             poses.append(pose or Pose())
             if wrong:
                 warnings.append(f"{what}{wrong}")
             if pose is None:
                 continue
-            if header.point_count < 2:
-                warnings.append(f"{what} has {'one point' if header.point_count else 'no points'}")
-            first = len(parts)
-            if header.point_count and not _has_places(header):
-                failed = native.PatinaError(f"{what}: its points have no positions: {', '.join(header.point_fields)}", -4)
+            if scan.points < 2:
+                warnings.append(f"{what} has {'one point' if scan.points else 'no points'}")
+            first, before = len(parts), read
+            if scan.points and not _has_places(scan):
+                failed = native.PatinaError(f"{what}: its points have no positions: {', '.join(field.name for field in scan.fields)}", -4)
                 warnings.append(str(failed))
                 continue
-            for count, data in _pieces(file, header, pose):
+            for found in _pieces(file, index, pose):
                 progress.step(read / total)
-                read += count
-                keep = wanted.mask(done, data["positions"])
-                done += len(keep)
-                part = {name: values[keep] for name, values in data.items()}
-                parts.append(part | {"scan": np.full(int(keep.sum()), index, np.float32)})
+                if found is not None:
+                    count, data = found
+                    read += count
+                    keep = wanted.mask(done, data["positions"])
+                    done += len(keep)
+                    part = {name: values[keep] for name, values in data.items()}
+                    parts.append(part | {"scan": np.full(int(keep.sum()), index, np.float32)})
                 yield jobs.Pause()
-            _level_colors(header, parts[first:])
-    except native.PatinaError:
-        raise
-    except Exception as error:
-        raise native.PatinaError(f"{path.name}: scan {index}: {_first_line(error)}", -4) from None
+            if read - before < scan.points:
+                warnings.append(f"{what} announces {scan.points:,} points and holds {read - before:,}")
+            _level_colors(scan, parts[first:])
+    except native.PatinaError as error:
+        if error.code == native.CANCELLED:
+            raise
+        raise native.PatinaError(str(error).replace(f"{path.name}: ", f"{path.name}: scan {index}: ", 1), error.code) from None
+    except MemoryError:
+        raise native.PatinaError(f"{path.name}: scan {index}: memory is short for its points", -2) from None
     finally:
         file.close()
     if failed and not parts:
         raise failed
+    crs = file.head.crs
     points = merge(path.stem, parts, {"crs": crs, **crs_notes(units(crs))} if crs else {})
-    points.warnings += warnings
     points.notes |= scanners_of(stations if np.isfinite(stations).any() else [], points.origin)
-    points.notes |= scans.note(_described(headers, points, stations, poses, path.name))
+    points.notes |= scans.note(_described(file.scans, points, stations, poses, path.name))
+    points.warnings = joined(path.name, warnings + points.warnings)
     if wanted.every == 1:  # a thinned grid is none
         yield from grid_normals(points, stations, progress)
     return points
 
 
-def _pose(header: Any) -> tuple[Pose | None, str]:
+def joined(name: str, warnings: list[str]) -> list[str]:
+    """The first few, and how many more there are: a file of thousands of scans may have as many faults."""
+    more = len(warnings) - MOST_WARNINGS
+    return warnings if more <= 0 else [*warnings[:MOST_WARNINGS - 1], f"{name}: {more + 1:,} more scans have such faults"]
+
+
+def _pose(scan: e57_xml.Scan) -> tuple[Pose | None, str]:
     """The turn and the place of a scan, none where it has no pose; or None, where it is none of a pose; and what is wrong, to be said
     behind the scan's number."""
-    if not header.has_pose():
+    if not scan.has_pose:
         return Pose(), ""
-    pose, values = header.node["pose"], {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}
-    if pose.isDefined("rotation"):
-        values = {axis: float(pose["rotation"][axis].value()) for axis in "wxyz"}
+    values = {axis: scan.rotation.get(axis, math.nan) for axis in "wxyz"} if scan.rotation else {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}
     w, x, y, z = (values[axis] for axis in "wxyz")
-    place = np.array([float(pose["translation"][axis].value()) for axis in "xyz"] if pose.isDefined("translation") else [0.0] * 3)
+    place = np.array([scan.translation.get(axis, math.nan) if scan.translation else 0.0 for axis in "xyz"])
     length = math.sqrt(w * w + x * x + y * y + z * z)
     if not (math.isfinite(length) and length > 1e-6 and np.isfinite(place).all()):
         return None, f" is left out: its quaternion {w:g} {x:g} {y:g} {z:g} or its place is no pose"
@@ -151,25 +193,24 @@ def _pose(header: Any) -> tuple[Pose | None, str]:
     return Pose(turn, place), wrong
 
 
-def _station(header: Any, pose: Pose | None) -> np.ndarray:
+def _station(scan: e57_xml.Scan, pose: Pose | None) -> np.ndarray:
     """Where the scanner stood, in the file's coordinates; NaN where that is not said. Without a pose a scan that has ranges
     or a grid was taken from zero; points alone may come from anywhere."""
-    local = {_SPHERICAL[0], "rowIndex", "columnIndex"} & set(header.point_fields)
-    known = pose is not None and (header.has_pose() or local)
+    local = {_SPHERICAL[0], "rowIndex", "columnIndex"} & _names(scan)
+    known = pose is not None and (scan.has_pose or local)
     return pose.place.copy() if known else np.full(3, np.nan)
 
 
-def _described(headers: list[Any], points: PointFile, stations: list[np.ndarray], poses: list[Pose], name: str) -> list[scans.Scan]:
+def _described(headers: list[e57_xml.Scan], points: PointFile, stations: list[np.ndarray], poses: list[Pose], name: str) -> list[scans.Scan]:
     """What is known of each scan; says at the points what is wrong with their grids."""
     found = []
     of = points.scalars.get("scan", np.empty(0, np.float32))
     for index, header in enumerate(headers):
-        own = np.flatnonzero(of == index)
-        own = slice(own[0], own[-1] + 1) if len(own) else slice(0)
+        own = slice(*np.searchsorted(of, (index, index + 1)))
         places = points.positions[own].astype(np.float64)
         direction = scans.direction(places, stations[index] - points.origin)
         interval, grid = 0.0, (0, 0)
-        if {"rowIndex", "columnIndex"} <= set(header.point_fields) and len(places):
+        if {"rowIndex", "columnIndex"} <= _names(header) and len(places):
             row, column = (points.scalars[axis][own] for axis in ("row", "column"))
             good = (row >= 0) & (column >= 0) & (row < CELLS) & (column < CELLS)
             if not good.all():
@@ -178,56 +219,45 @@ def _described(headers: list[Any], points: PointFile, stations: list[np.ndarray]
                 points.warnings.append(f"{name}: scan {index}: {taken:,} points lie in cells of its grid that others have")
             interval = scans.interval(places[good], row[good], column[good])
             grid = (int(column[good].max(initial=-1)) + 1, int(row[good].max(initial=-1)) + 1)
-        found.append(scans.Scan(_name(header), len(places), direction, interval, poses[index].matrix(), grid))
+        found.append(scans.Scan(header.name, len(places), direction, interval, poses[index].matrix(), grid))
     return found
 
 
-def _name(header: Any) -> str:
-    try:
-        return str(header.node["name"].value())
-    except Exception:  # the element is optional
-        return ""
+def _names(scan: e57_xml.Scan) -> set[str]:
+    return {field.name for field in scan.fields}
 
 
-def _has_places(header: Any) -> bool:
-    fields = _fields(header)
+def _has_places(scan: e57_xml.Scan) -> bool:
+    fields = _fields(scan)
     return any(all(name in fields for name in names) for names in (_CARTESIAN, _SPHERICAL))
 
 
-def _fields(header: Any) -> dict[str, str]:
-    """The numbers that the scan's points declare: local name → name in the file."""
-    from pye57 import libe57
-    prototype = libe57.StructureNode(header.points.prototype())
-    numbers = (libe57.IntegerNode, libe57.ScaledIntegerNode, libe57.FloatNode)
-    return {name.rpartition(":")[2]: name for name in header.point_fields if isinstance(prototype[name], numbers)}
+def _fields(scan: e57_xml.Scan) -> dict[str, e57_xml.Field]:
+    """The numbers that the scan's points declare, by local name."""
+    return {field.name.rpartition(":")[2]: field for field in scan.fields if field.kind in {"Float", "Integer", "ScaledInteger"}}
 
 
-def _pieces(file: Any, header: Any, pose: Pose, places: bool = False) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+def _pieces(file: File, index: int, pose: Pose, places: bool = False) -> Iterator[tuple[int, dict[str, np.ndarray]] | None]:
     """How many points were read, and of the valid ones "positions" in the file's coordinates, "normals" and "rgb" where there
-    are such (the latter as the file has them), and all other numbers by name. pye57's own way knows a few fields of certain
-    types; float64 holds what any file declares. places: positions alone."""
-    from pye57 import libe57
-    if not header.point_count:
+    are such (the latter as the file has them), and all other numbers by name. None: nothing yet. places: positions alone."""
+    scan = file.scans[index]
+    if not scan.points:
         return
-    fields, size = _fields(header), min(SMALL_PIECE, header.point_count)
+    fields = _fields(scan)
     if places:
         needed = (_CARTESIAN if all(name in fields for name in _CARTESIAN) else _SPHERICAL) + _INVALID
         fields = {name: field for name, field in fields.items() if name in needed}
-    data = {name: np.empty(size, np.float64) for name in fields}
-    buffers = libe57.VectorSourceDestBuffer()
-    for name, field in fields.items():
-        buffers.append(libe57.SourceDestBuffer(file.image_file, field, data[name], size, True, True))
-    reader = header.points.reader(buffers)
-    try:
-        while count := reader.read():
-            piece = {name: values[:count] for name, values in data.items()}
-            valid = np.ones(count, bool)
-            for name in _INVALID:
-                if name in piece:
-                    valid &= piece.pop(name) == 0
-            yield count, _columns({name: values[valid] for name, values in piece.items()}, pose)
-    finally:
-        reader.close()
+    for found in file.pieces(index, [field.name for field in fields.values()]):
+        if found is None:
+            yield None
+            continue
+        count, values = found
+        piece = dict(zip(fields, values, strict=True))
+        valid = np.ones(count, bool)
+        for name in _INVALID:
+            if name in piece:
+                valid &= piece.pop(name) == 0
+        yield count, _columns({name: values[valid] for name, values in piece.items()}, pose)
 
 
 def _columns(piece: dict[str, np.ndarray], pose: Pose) -> dict[str, np.ndarray]:
@@ -245,13 +275,11 @@ def _columns(piece: dict[str, np.ndarray], pose: Pose) -> dict[str, np.ndarray]:
     return found
 
 
-def _knows_levels(header: Any) -> bool:
+def _knows_levels(scan: e57_xml.Scan) -> bool:
     """Whether a scan's colours have limits before its points are read, as far as it has any."""
-    from pye57 import libe57
-    if not set(_COLORS) <= set(_fields(header)):
+    if not set(_COLORS) <= set(_fields(scan)):
         return True
-    prototype = libe57.StructureNode(header.points.prototype())
-    limits = [[_limit(header, prototype, name, end) for end in ("Minimum", "Maximum")] for name in _COLORS]
+    limits = [[_limit(scan, name, end) for end in ("Minimum", "Maximum")] for name in _COLORS]
     return bool(np.isfinite(limits).all() and all(high > low for low, high in limits))
 
 
@@ -260,15 +288,13 @@ def in_pieces(path: Path, least: int, names: Collection[str], progress: Progress
     return (yield from e57_pieces.steps(path, least, names, progress))
 
 
-def _level_colors(header: Any, parts: list[dict[str, np.ndarray]]) -> None:
+def _level_colors(scan: e57_xml.Scan, parts: list[dict[str, np.ndarray]]) -> None:
     """Brings a scan's colours to 0..65535, from the limits that it declares, else from those of its numbers."""
-    from pye57 import libe57
     colored = [part for part in parts if "rgb" in part]
     if not colored:
         return
-    prototype = libe57.StructureNode(header.points.prototype())
     for axis, name in enumerate(_COLORS):
-        low, high = (_limit(header, prototype, name, end) for end in ("Minimum", "Maximum"))
+        low, high = (_limit(scan, name, end) for end in ("Minimum", "Maximum"))
         if not np.isfinite([low, high]).all() or high <= low:
             most = max((float(part["rgb"][:, axis].max(initial=0.0)) for part in colored), default=0.0)
             low, high = 0.0, 1.0 if most <= 1.0 else 255.0 if most <= 255.0 else 65535.0
@@ -276,12 +302,13 @@ def _level_colors(header: Any, parts: list[dict[str, np.ndarray]]) -> None:
             part["rgb"][:, axis] = np.rint(np.clip((part["rgb"][:, axis] - low) / (high - low), 0.0, 1.0) * 65535.0)
 
 
-def _limit(header: Any, prototype: Any, name: str, end: str) -> float:
+def _limit(scan: e57_xml.Scan, name: str, end: str) -> float:
     """NaN when neither the scan nor the numbers' own type says it."""
-    if header.node.isDefined(f"colorLimits/{name}{end}"):
-        return float(header.node["colorLimits"][f"{name}{end}"].value())
-    value = float(getattr(prototype[name], end.lower())())
-    return value if abs(value) < 1e30 else np.nan
+    if f"{name}{end}" in scan.limits:
+        return scan.limits[f"{name}{end}"]
+    field = _fields(scan)[name]
+    value = field.low if end == "Minimum" else field.high
+    return value if abs(value) < 1e30 else math.nan
 
 
 def _cartesian(piece: dict[str, np.ndarray]) -> np.ndarray:
@@ -290,13 +317,6 @@ def _cartesian(piece: dict[str, np.ndarray]) -> np.ndarray:
     away, azimuth, elevation = (piece[name] for name in _SPHERICAL)
     level = away * np.cos(elevation)
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), away * np.sin(elevation)], 1)
-
-
-def _crs(file: Any) -> str:
-    try:
-        return str(file.root["coordinateMetadata"].value())
-    except Exception:  # the element is optional
-        return ""
 
 
 def merge(name: str, parts: list[dict[str, np.ndarray]], notes: dict[str, str | float]) -> PointFile:

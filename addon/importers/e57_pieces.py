@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import jobs, native
+from ..unpacking import e57_xml
 from . import e57, scans
 from .crs import units
 from .reading import Pieces, PointFile, Progress, crs_notes, origin_of, scanners_of
@@ -22,57 +23,52 @@ def steps(path: Path, least: int, names: Collection[str], progress: Progress) ->
     """None: the file is read whole. Places are read twice: the origin follows from the box of all of them, whatever the file says of it."""
     file = e57._open(path)
     try:
-        headers = [file.get_header(index) for index in range(file.scan_count)]
-        total = sum(header.point_count for header in headers)
+        headers = file.scans
+        total = sum(header.points for header in headers)
         if total <= least or not all(map(_comes_in_pieces, headers)):
             return None
         poses = [e57._pose(header)[0] or e57.Pose() for header in headers]
         lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-        for header, pose in zip(headers, poses, strict=True):
-            for _, piece in e57._pieces(file, header, pose, places=True):
+        for index, pose in enumerate(poses):
+            for found in e57._pieces(file, index, pose, places=True):
                 progress.step(0.0)
+                if found is None:
+                    yield jobs.Pause()
+                    continue
+                piece = found[1]
                 positions = piece["positions"][np.isfinite(piece["positions"]).all(axis=1)]
                 lower, upper = np.minimum(lower, positions.min(axis=0, initial=np.inf)), np.maximum(upper, positions.max(axis=0, initial=-np.inf))
                 yield jobs.Pause()
         if not np.isfinite(lower).all():
             return None
-        crs = e57._crs(file)
-    except native.PatinaError:
-        raise
-    except Exception:  # what is wrong is told by whoever reads it whole
-        return None
+        crs = file.head.crs
+    except native.PatinaError as error:
+        if error.code == native.CANCELLED:
+            raise
+        return None  # what is wrong is told by whoever reads it whole
     finally:
         file.close()
     notes: dict[str, Any] = {"crs": crs, **crs_notes(units(crs))} if crs else {}
     origin = origin_of(lower, upper, 1e-4)
     wanted = frozenset(names)
     return Pieces(total, origin, (tuple(lower.tolist()), tuple(upper.tolist())), notes,
-                  lambda reading: _told(path, _each(path, poses, origin, wanted, notes, reading)), zeros=True)
+                  lambda reading: _each(path, poses, origin, wanted, notes, reading), zeros=True)
 
 
-def _comes_in_pieces(header: Any) -> bool:
-    if header.point_count < 2:
+def _comes_in_pieces(header: e57_xml.Scan) -> bool:
+    if header.points < 2:
         return False
     pose, wrong = e57._pose(header)
-    return pose is not None and not wrong and e57._has_places(header) and not set(header.point_fields) & _GRID and e57._knows_levels(header)
-
-
-def _told(path: Path, pieces: Iterator[PointFile]) -> Iterator[PointFile]:
-    try:
-        yield from pieces
-    except native.PatinaError:
-        raise
-    except Exception as error:  # libE57 throws its own kinds
-        raise native.PatinaError(f"{path.name}: {e57._first_line(error)}", -4) from None
+    return pose is not None and not wrong and e57._has_places(header) and not e57._names(header) & _GRID and e57._knows_levels(header)
 
 
 def _each(path: Path, poses: list[e57.Pose], origin: tuple[float, float, float], names: frozenset[str], notes: dict[str, Any],
-          progress: Progress) -> Iterator[PointFile]:
+          progress: Progress) -> Iterator[PointFile | None]:
     """All with the columns that any scan has; notes: what is known of the scans is written there at the end."""
     file = e57._open(path)
     try:
-        headers = [file.get_header(index) for index in range(file.scan_count)]
-        total, done = sum(header.point_count for header in headers), 0
+        headers = file.scans
+        total, done = sum(header.points for header in headers), 0
         fields = [set(e57._fields(header)) for header in headers]
         colored, has_normals = (any(set(needed) <= own for own in fields) for needed in (e57._COLORS, e57._NORMALS))
         columns = names & {e57._NAMES.get(name, name) for own in fields for name in own} | {"scan"}
@@ -80,8 +76,12 @@ def _each(path: Path, poses: list[e57.Pose], origin: tuple[float, float, float],
         described = []
         for index, (header, pose) in enumerate(zip(headers, poses, strict=True)):
             way, count, held = np.zeros(3), 0, 0
-            for read, piece in e57._pieces(file, header, pose):
+            for found in e57._pieces(file, index, pose):
                 progress.step(done / total)
+                if found is None:
+                    yield None
+                    continue
+                read, piece = found
                 done += read
                 e57._level_colors(header, [piece])
                 size = len(piece["positions"])
@@ -96,7 +96,7 @@ def _each(path: Path, poses: list[e57.Pose], origin: tuple[float, float, float],
                 way, count = way + sums[0], count + sums[1]
                 held += size
                 yield points
-            described.append(scans.Scan(e57._name(header), held, scans.mean_way(way, count), 0.0, pose.matrix(), (0, 0)))
+            described.append(scans.Scan(header.name, held, scans.mean_way(way, count), 0.0, pose.matrix(), (0, 0)))
         notes.update(scanners_of(stations if np.isfinite(stations).any() else [], origin) | scans.note(described))
     finally:
         file.close()

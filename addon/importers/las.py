@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""LAS 1.0 to 1.4 (ASPRS), read in pieces; LAZ and COPC through laspy with lazrs."""
+"""LAS 1.0 to 1.4 (ASPRS), read in pieces; LAZ and COPC through lazrs, in a process of its own."""
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import struct
 from collections.abc import Collection, Iterator
@@ -12,7 +13,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .. import jobs, native, readers
+from .. import jobs, native, readers, unpacking
 from . import crs
 from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, name_of, origin_of
 
@@ -42,8 +43,11 @@ _SCALARS = {"intensity": "intensity", "user_data": "user_data", "point_source_id
             "scan_angle": "scan_angle", "scan_angle_rank": "scan_angle_rank", "nir": "nir"}
 _OURS = {*_SCALARS, "positions", "rgb", "class", "gps_time", "return_number", "number_of_returns"}
 
-MISSING = ("LAZ and COPC files need the Python packages laspy and lazrs: Install Readers in the add-on's preferences fetches "
-           "them (Patina's extension for Blender 4.2 and later brings them); or unpack the file to LAS")
+FORMATS = "LAZ and COPC"  # as readers.PACKAGES has them
+
+
+def missing() -> str:
+    return f"{readers.how_to(FORMATS)}, or convert the file to LAS"
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,7 @@ class Header:
     lower: np.ndarray
     upper: np.ndarray
     crs: str
+    laszip: bytes = b""  # the record that says how points are packed
     extras: tuple[Extra, ...] = ()
     units: crs.Units | None = None
 
@@ -104,18 +109,18 @@ def read_header(path: Path) -> Header:
         box = struct.unpack_from("<12d", head, 131)
         if head[24:26] >= b"\x01\x04" and len(head) >= 255:
             count = struct.unpack_from("<Q", head, 247)[0] or count
-        words, extras, keys = _records(file, head, header_size, min(records, 4096), data_offset)
+        words, extras, keys, laszip = _records(file, head, header_size, min(records, 4096), data_offset)
     return Header(f"{head[24]}.{head[25]}", count, form & 0x3F, bool(form & 0xC0), record_size, data_offset,
-                  np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), words, extras,
+                  np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), words, laszip, extras,
                   crs.units(words, keys))
 
 
 def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int
-             ) -> tuple[str, tuple[Extra, ...], dict[int, float]]:
+             ) -> tuple[str, tuple[Extra, ...], dict[int, float], bytes]:
     """Of the variable records, before the points and behind them: the text of the coordinate system (WKT, else what the
-    GeoTIFF keys say in words), the extra dimensions, and the GeoTIFF keys that are numbers."""
+    GeoTIFF keys say in words), the extra dimensions, the GeoTIFF keys that are numbers, and what LASzip says of its packing."""
     wkt = words = ""
-    directory, doubles = b"", b""
+    directory, doubles, laszip = b"", b"", b""
     extras: tuple[Extra, ...] = ()
     for user, number, data in itertools.chain(_before(file, at, records, end), _behind(file, head)):
         if user == b"LASF_Projection" and number in {2112, 34737}:
@@ -125,9 +130,11 @@ def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int
             directory = directory or data
         elif user == b"LASF_Projection" and number == 34736:
             doubles = doubles or data
+        elif user == b"laszip encoded" and number == 22204:
+            laszip = laszip or data
         elif user == b"LASF_Spec" and number == 4:
             extras = extras or tuple(_extra(data[i:i + 192]) for i in range(0, len(data) - 191, 192))
-    return wkt or words, extras, _geo_keys(directory, doubles)
+    return wkt or words, extras, _geo_keys(directory, doubles), laszip
 
 
 def _geo_keys(directory: bytes, doubles: bytes) -> dict[int, float]:
@@ -190,7 +197,7 @@ def preview(path: Path) -> list[str]:
     names = {name for name, _ in _FORMATS.get(header.form, [])}
     return [f"LAS {header.version}, point format {header.form}{', compressed' * header.compressed}",
             f"{header.points:,} points", f"{size[0]:,.1f} x {size[1]:,.1f} x {size[2]:,.1f}",
-            *(["cannot be read yet: Install Readers in the add-on's preferences"] * (header.compressed and readers.lacks("laspy", "lazrs"))),
+            *(["cannot be read yet: choose Install Readers in the add-on's preferences"] * (header.compressed and readers.lacks("laspy", "lazrs"))),
             *(["colors"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
             *(["extra: " + ", ".join(extra.name for extra in header.extras)] * bool(header.extras)),
             *([f"units: {header.units}"] * bool(header.units)), *([crs.name(header.crs)[:80]] * bool(header.crs))]
@@ -214,31 +221,32 @@ def _record(path: Path, header: Header) -> np.dtype:
     return np.dtype(fields + more + [("more", f"V{header.record_size - size}")] * (header.record_size > size))
 
 
-def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray]:
+def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray | None]:
+    """Records, size at a time; None: nothing yet."""
     kind = _record(path, header)
     if header.compressed:
-        try:
-            readers.load("laspy", "lazrs")
-            import laspy
-            import lazrs
-        except ImportError:
-            raise native.PatinaError(MISSING, -5) from None
-        try:
-            with laspy.open(str(path)) as file:
-                for points in file.chunk_iterator(size):
-                    yield points.array.view(kind)  # packed as in the file, under our names
-        except (laspy.errors.LaspyException, lazrs.LazrsError, ValueError, OSError) as error:
-            raise _fail(path, f"cannot be unpacked: {error}") from None
-        except BaseException as error:  # what lazrs has not thought of is none of Exception's kinds
-            if type(error).__name__ != "PanicException":
-                raise
-            raise _fail(path, f"cannot be unpacked: {error}") from None
+        yield from _unpacked(path, header, kind, size)
         return
     have = (path.stat().st_size - header.data_offset) // kind.itemsize
     if have < header.points:
         raise _fail(path, f"ends after {max(have, 0):,} of {header.points:,} points")
     for first in range(0, header.points, size):
         yield np.fromfile(path, kind, min(size, header.points - first), offset=header.data_offset + first * kind.itemsize)
+
+
+def _unpacked(path: Path, header: Header, kind: np.dtype, size: int) -> Iterator[np.ndarray | None]:
+    if readers.lacks("lazrs"):
+        raise native.PatinaError(f"{path.name}: {missing()}", -5)
+    if not header.laszip:
+        raise _fail(path, "cannot be unpacked: it has no record that says how its points are packed")
+    size = max(1, min(size, unpacking.SLOT // kind.itemsize, header.points))
+    with unpacking.Unpacker(path, "laz", size * kind.itemsize, 2 * path.stat().st_size, offset=header.data_offset, vlr=header.laszip.hex(),
+                            record=kind.itemsize, points=header.points, piece=size) as process:
+        for answer in process.answers():
+            if answer is None:
+                yield None
+            elif "slot" in answer:
+                yield np.frombuffer(process.take(answer["slot"], answer["count"] * kind.itemsize), kind)
 
 
 class _Columns:
@@ -290,13 +298,15 @@ def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> job
     origin = origin_of(header.lower, header.upper, float(header.scale.min()))
     columns = _Columns(header.points)
     done = 0
-    for piece in _pieces(path, header, SMALL_PIECE):
-        progress.step(done / max(header.points, 1))
-        positions = _places(header, piece, origin)
-        keep = slice(None) if wanted.keeps_all() else wanted.mask(done, positions, origin)
-        done += len(piece)
-        columns.add(_extras(header, piece, keep) | {"positions": positions[keep]} | _fields(piece, keep))
-        yield jobs.Pause()
+    with contextlib.closing(_pieces(path, header, SMALL_PIECE)) as pieces:
+        for piece in pieces:
+            progress.step(done / max(header.points, 1))
+            if piece is not None:
+                positions = _places(header, piece, origin)
+                keep = slice(None) if wanted.keeps_all() else wanted.mask(done, positions, origin)
+                done += len(piece)
+                columns.add(_extras(header, piece, keep) | {"positions": positions[keep]} | _fields(piece, keep))
+            yield jobs.Pause()
     return _assemble(path, header, origin, columns)
 
 
@@ -356,6 +366,9 @@ def _each(path: Path, header: Header, origin: tuple[float, float, float], names:
         start, passes = np.inf, 2
         for piece in _pieces(path, header, SMALL_PIECE):
             progress.step(done / header.points / passes)
+            if piece is None:
+                yield None
+                continue
             done += len(piece)
             times = piece["gps_time"]
             start = min(start, float(times[np.abs(times) <= MOST_SECONDS].min(initial=np.inf)))
@@ -363,6 +376,9 @@ def _each(path: Path, header: Header, origin: tuple[float, float, float], names:
         start = start if np.isfinite(start) else 0.0
     for piece in _pieces(path, header, SMALL_PIECE):
         progress.step(done / header.points / passes)
+        if piece is None:
+            yield None
+            continue
         done += len(piece)
         found = _extras(header, piece, slice(None)) | _fields(piece, slice(None))
         if "gps_time" in found:

@@ -201,8 +201,7 @@ def grid_normals(points: PointFile, stations: Sequence[np.ndarray], progress: Pr
     if not {"row", "column"} <= points.scalars.keys():
         return
     for index, station in enumerate(stations):
-        own = np.flatnonzero(points.scalars["scan"] == index) if "scan" in points.scalars else np.arange(len(points.positions))
-        own = slice(own[0], own[-1] + 1) if len(own) else slice(0)
+        own = slice(*np.searchsorted(points.scalars["scan"], (index, index + 1))) if "scan" in points.scalars else slice(len(points.positions))
         if not len(points.positions[own]) or not np.isfinite(station).all() or \
                 points.normals is not None and points.normals[own].any():
             continue

@@ -40,7 +40,7 @@ class _Installing(Stepped):
             what.close()
         lacking = readers.missing()
         if lacking:
-            self.report({'WARNING'}, f"Patina: {', '.join(lacking)} still not there")
+            self.report({'WARNING'}, f"Patina: still missing: {', '.join(lacking)}. {readers.WITHOUT}")
         else:
             self.report({'INFO'}, "LAZ, COPC and E57 can be read now")
         return {'FINISHED'}
@@ -51,7 +51,7 @@ class _Installing(Stepped):
 
 
 class PATINA_OT_install_readers(_Installing, Operator):
-    """Fetch the packages that read LAZ, COPC and E57 from PyPI, into a folder of Patina's own"""
+    """Download the missing packages that read LAZ, COPC and E57 from PyPI, into Patina's own folder"""
 
     bl_idname = "patina.install_readers"
     bl_label = "Install Readers"

@@ -11,7 +11,6 @@ import contextlib
 import json
 import os
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -22,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import jobs, memory, native
+from .. import jobs, memory, native, programs
 
 MOST_TASKS = 24  # pages that are handed in at once: where drawing is slow, Blender looks but a few times a second
 ROOM = 4096  # pages that are asked for at once
@@ -74,8 +73,7 @@ class Stream:
         self._returned = self._seen = 0
         self._here: set[int] = set()
         try:
-            self._process = subprocess.Popen([_python(), "-I", str(Path(__file__).with_name("starter.py")), *_paths(),
-                                              str(Path(__file__).with_name("reader.py")), self._folder.name],
+            self._process = subprocess.Popen([*programs.command(Path(__file__).with_name("reader.py")), self._folder.name],
                                              stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         except OSError as error:
             raise native.PatinaError(f"{place}: the process that reads does not start: {error.strerror}", -3) from None
@@ -245,17 +243,6 @@ class Stream:
         with contextlib.suppress(OSError):  # it has ended, which others tell
             self._process.stdin.write(json.dumps(words).encode() + b"\n")
             self._process.stdin.flush()
-
-
-def _python() -> str:
-    """Blender's own; where it names another program than itself, that of its folder."""
-    own = Path(sys.prefix) / "bin" / f"python{sys.version_info[0]}.{sys.version_info[1]}"
-    return str(own) if own.exists() else sys.executable
-
-
-def _paths() -> list[str]:
-    """Where Blender's Python looks for packages."""
-    return [os.pathsep.join(path for path in sys.path if path)]
 
 
 def _finish(process: subprocess.Popen, folder: tempfile.TemporaryDirectory) -> None:

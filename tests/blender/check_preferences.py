@@ -2,6 +2,8 @@
 """The add-on's preferences: readers of LAZ and E57 from files and by pip, the cache, defaults of device, threads and memory."""
 
 import contextlib
+import importlib
+import importlib.machinery
 import io
 import shutil
 import subprocess
@@ -150,10 +152,11 @@ def test_readers_that_do_not_fit():
 
 
 def test_readers_by_pip():
-    """What pip fetches is installed; what pip says is said; Esc ends it."""
+    """What pip fetches is installed; what pip says is said; a package without a wheel leaves the others; Esc ends it."""
     made = wheel("patina_try_d", "fetched")
     (SCRATCH / "pip.py").write_text(
-        "import shutil, sys\nargs = sys.argv\nassert 'download' in args and '--no-deps' in args and 'laspy==' in ' '.join(args)\n"
+        "import shutil, sys\nargs = sys.argv\nassert 'download' in args and '--no-deps' in args\n"
+        "if 'laspy==' not in args[-1]: sys.exit(f'ERROR: No matching distribution found for {args[-1]}')\n"
         f"shutil.copy({str(made)!r}, args[args.index('-d') + 1])\n")
     (SCRATCH / "no_pip.py").write_text("import sys\nprint('ERROR: Could not find a version')\nsys.exit(1)\n")
     (SCRATCH / "slow_pip.py").write_text("import time\ntime.sleep(60)\n")
@@ -170,6 +173,14 @@ def test_readers_by_pip():
             operators.PIP = [sys.executable, str(SCRATCH / "no_pip.py")]
             fails("Could not find a version", bpy.ops.patina.install_readers)
             fails("Install from Files", bpy.ops.patina.install_readers)
+            (SCRATCH / "no_wheel.py").write_text("import sys\nsys.exit('ERROR: No matching distribution found for ' + sys.argv[-1])\n")
+            operators.PIP = [sys.executable, str(SCRATCH / "no_wheel.py")]
+            fails(f"PyPI has no wheel of laspy==2.7.0, lazrs==0.8.2, pye57==0.4.19, pyquaternion==0.9.9 for Python 3.{sys.version_info[1]}",
+                  bpy.ops.patina.install_readers)
+            fails("Convert LAZ files to LAS", bpy.ops.patina.install_readers)
+            (SCRATCH / "no_net.py").write_text("import sys\nprint('WARNING: Retrying (Retry(total=4))')\nsys.exit('ERROR: No matching distribution found')\n")
+            operators.PIP = [sys.executable, str(SCRATCH / "no_net.py")]
+            fails("PyPI cannot be reached", bpy.ops.patina.install_readers)
             told = []
             steps = readers.download(SCRATCH, [sys.executable, str(SCRATCH / "slow_pip.py")])
             told.append(next(steps))
@@ -177,6 +188,30 @@ def test_readers_by_pip():
             check("0 of 4" in told[0], f"{told}")
     finally:
         operators.PIP = None
+
+
+def test_a_package_of_another_python_is_missing():
+    """The zip's lazrs holds modules of some Pythons. On another one it is missing, and what is installed then comes first."""
+    with without_readers("lazrs"):
+        packages, readers.PACKAGES = readers.PACKAGES, {"lazrs": "LAZ and COPC"}
+        kept, known = list(sys.path), {name: sys.modules.pop(name) for name in [*sys.modules] if name.split(".")[0] == "lazrs"}
+        foreign, own = SCRATCH / "foreign/lazrs", FOLDER / "lazrs"
+        try:
+            for place, suffix in ((foreign, ".cpython-39-x86_64-linux-gnu.so"), (own, importlib.machinery.EXTENSION_SUFFIXES[0])):
+                place.mkdir(parents=True, exist_ok=True)
+                (place / "__init__.py").write_text("")
+                (place / f"lazrs{suffix}").write_bytes(b"")
+            sys.path[:] = [str(foreign.parent), *(path for path in sys.path if not (Path(path) / "lazrs").is_dir())]
+            importlib.invalidate_caches()
+            check(readers.missing() == ["lazrs"], f"{readers.missing()}")
+            check(readers.status() == [("LAZ and COPC: needs the Python package lazrs", False)], f"{readers.status()}")
+            check("3.10 to 3.14" in readers.how_to("LAZ and COPC") and "Install Readers" in readers.how_to("LAZ and COPC"), readers.how_to("LAZ and COPC"))
+            readers.look_in(FOLDER)
+            check(not readers.missing() and sys.path[0] == str(FOLDER), f"{readers.missing()}, {sys.path[:2]}")
+        finally:
+            sys.path[:], readers.PACKAGES = kept, packages
+            sys.modules.update(known)
+            importlib.invalidate_caches()
 
 
 def test_what_lacks_is_told_in_the_preview():

@@ -172,6 +172,9 @@ def check(platform, path):
             assert all(f"## {name.removeprefix('wheels/')}\n" in told for name in listed) and "not said" not in told, told
             if platform == "linux-x64":
                 check_sources(archive.read("docs/sources.zip"), data)
+            assert all("-py3-none-" in name for name in listed), f"bound to one Python, others could not enable it: {listed}"
+        packed = [name for name in archive.namelist() if "lazrs" in name and (name.endswith(".whl") or ".dist-info/METADATA" in name)]
+        assert packed or platform == "windows-arm64", "no lazrs"  # of which PyPI has no wheel
         machine, exported, needed = READERS[system](data)
     assert machine == processor, machine
     assert not DECLARED - exported, f"does not export {sorted(DECLARED - exported)}"
@@ -180,6 +183,7 @@ def check(platform, path):
     assert not [name for name in needed if not MAY[system].fullmatch(name)], needed
     newest = max((tuple(map(int, name.removeprefix("GLIBC_").split("."))) for name in needed if name.startswith("GLIBC_")), default=())
     assert newest <= GLIBC, newest
+    assert path.stat().st_size < 12e6, f"{path.stat().st_size / 1e6:.2f} MB"
     if not legacy and validator():
         validate(path)
     if system == "macos":
