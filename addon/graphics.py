@@ -43,7 +43,7 @@ class Shaders:
     """Compiles each shader once. One that failed is not compiled again with each redraw."""
 
     def __init__(self) -> None:
-        self._known: dict[str, gpu.types.GPUShader | GraphicsError] = {}
+        self._known: dict[str, gpu.types.GPUShader | str] = {}  # a text: why there is none
 
     def get(self, kind: str, create: Callable[[], gpu.types.GPUShader]) -> gpu.types.GPUShader:
         """Raises GraphicsError."""
@@ -51,10 +51,10 @@ class Shaders:
             try:
                 self._known[kind] = create()
             except Exception as error:
-                self._known[kind] = _lacks(error)
+                self._known[kind] = str(_lacks(error))  # an exception that is kept would keep the engine that drew
         found = self._known[kind]
-        if isinstance(found, GraphicsError):
-            raise found
+        if isinstance(found, str):
+            raise GraphicsError(found)
         return found
 
     def forget(self) -> None:

@@ -115,7 +115,7 @@ class Viewport:
     """One 3D view region."""
 
     def __init__(self, engine: bpy.types.RenderEngine) -> None:
-        self.engine = weakref.ref(engine, lambda _: _wake())  # anywhere in Python's work: the timer closes
+        self._engine = weakref.ref(engine, lambda _: _wake())  # anywhere in Python's work: the timer closes
         self.area = 0  # where it is, to find its statistics
         self._region = 0  # of the area
         self.message = ""  # what went wrong last
@@ -152,6 +152,16 @@ class Viewport:
         self._chosen: np.ndarray | None = None  # places of vertices that are selected in Edit Mode
         self._chosen_batch: gpu.types.GPUBatch | None = None
         _VIEWPORTS.add(self)
+
+    def engine(self) -> bpy.types.RenderEngine | None:
+        """The engine that this draws for. None if Blender has freed it, also while Python still refers to it."""
+        found = self._engine()
+        try:
+            if found is not None:
+                found.is_preview  # noqa: B018  raises ReferenceError if freed
+            return found
+        except ReferenceError:
+            return None
 
     def update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """The scene changed."""
@@ -212,14 +222,8 @@ class Viewport:
         due = self._last is not None and not self._last.whole()
         if due and idle and time.monotonic() - self._moved > REST:
             self._ask(pace.FULL, pace.next_detail(self._last.detail))
-        if news:
-            try:
-                engine.is_preview  # noqa: B018  Blender may have freed it
-                if not _redraw(self.area, self._region, panels=not due):
-                    engine.tag_redraw()
-            except ReferenceError:
-                self.close()
-                return False
+        if news and not _redraw(self.area, self._region, panels=not due):
+            engine.tag_redraw()
         return not idle or due or news
 
     def close(self) -> None:

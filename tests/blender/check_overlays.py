@@ -31,14 +31,22 @@ def at_rest(seconds=0.4):
     return come
 
 
+def within(picture, region):
+    return picture[region.y:region.y + region.height, region.x:region.x + region.width]
+
+
 def dark_pixels():
-    """Of the 3D views on the screen, without having them drawn again."""
-    picture, total = screen.pixels(), 0
+    """Of the 3D views on the screen, without having them drawn again. Headers and tools, which lie over a view and are of other sizes in each
+    version of Blender, do not count."""
+    picture, total = screen.pixels().copy(), 0
     for place in bpy.context.window_manager.windows[0].screen.areas:
-        for region in place.regions if place.type == 'VIEW_3D' else ():
+        regions = list(place.regions) if place.type == 'VIEW_3D' else []
+        for region in regions:
+            if region.type != 'WINDOW' and region.width > 1 and region.height > 1:
+                within(picture, region)[:] = 255
+        for region in regions:
             if region.type == 'WINDOW':
-                part = picture[region.y:region.y + region.height, region.x:region.x + region.width]
-                total += int((part.max(axis=2) < DARK).sum())
+                total += int((within(picture, region).max(axis=2) < DARK).sum())
     return total
 
 

@@ -244,6 +244,23 @@ def test_toggling_lets_go():
     yield lambda: not viewport._VIEWPORTS
 
 
+def test_a_freed_engine_is_let_go():
+    """Python may still refer to an engine that Blender has freed; then every use of it raises an error."""
+
+    class Freed:
+        @property
+        def is_preview(self):
+            raise ReferenceError("StructRNA of type PatinaRenderEngine has been removed")
+
+    setup()
+    engine = Freed()
+    found = viewport.Viewport(engine)
+    check(found.engine() is None and viewport.of_area(area()) is not found, "taken for one that lives")
+    viewport._wake()
+    yield lambda: found not in viewport._VIEWPORTS
+    check(not found.tick(), "the timer comes again")
+
+
 def test_leaving_midway():
     """Leaving Rendered mode while points are made a cloud of, or while they are drawn, ends both."""
     rng = np.random.default_rng(2)
