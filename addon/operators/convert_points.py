@@ -11,9 +11,6 @@ from bpy.types import ID, Context, Object, Operator
 from .. import importers, point_data
 from ..sync import attributes
 
-_SKIPPED = {"name", "rna_type", "type", "is_active", "is_override_data", "use_apply_on_spline", "execution_time", "persistent_uid",
-            "node_warnings", "panels", "bakes", "show_group_selector", "use_pin_to_last", "show_manage_panel"}
-
 
 def why_not(obj: Object | None, kind: str) -> str:
     """Why an object cannot become one of this kind ('MESH' or 'POINTCLOUD'); empty: it can."""
@@ -59,8 +56,8 @@ class _Kept:
         self.obj, self._kind, self._name = obj, kind, data.name
         self._properties = dict(data.items())
         self._color = _drawn_color(obj)
-        self._modifiers = [_modifier(modifier) for modifier in obj.modifiers if modifier.type == 'NODES']
-        self._drivers = obj.copy()  # with copies of its drivers: the originals go with their modifiers
+        self._modifiers = {modifier.name: modifier.show_viewport for modifier in obj.modifiers if modifier.type == 'NODES'}
+        self._copy = obj.copy()  # with copies of its modifiers and drivers
         self._data = data if data.animation_data else None
         self._old = data
 
@@ -73,24 +70,10 @@ class _Kept:
             self._restore_color(data)
             if self._data:
                 _copy_animation(self._data, data)
-        present = {modifier.name for modifier in obj.modifiers}
-        for name, settings, inputs, shown in self._modifiers:
-            modifier = obj.modifiers.get(name) if name in present else obj.modifiers.new(name, 'NODES')
-            if modifier is None:
-                continue
-            for key, value in settings.items():
-                try:
-                    setattr(modifier, key, value)
-                except (AttributeError, TypeError, ValueError):
-                    pass  # of another version
-            for key, value in inputs.items():
-                modifier[key] = value
-            modifier.show_viewport = shown
-        _restore_drivers(self._drivers, obj)
-        temporary = self._drivers
-        if temporary.animation_data:
-            temporary.animation_data_clear()
-        bpy.data.objects.remove(temporary)
+        if self._modifiers:
+            _copy_modifiers(self._copy, obj, self._modifiers)
+        _restore_drivers(self._copy, obj)
+        bpy.data.objects.remove(self._copy)
         if obj.type == self._kind:
             if self._old != data and not self._old.users:
                 (bpy.data.meshes if isinstance(self._old, bpy.types.Mesh) else bpy.data.pointclouds).remove(self._old)
@@ -126,12 +109,28 @@ def _first_color(data: ID) -> str | None:
     return next((name for name in (*attributes.COLOR_NAMES, *names) if name in names), None)
 
 
-def _modifier(modifier: bpy.types.Modifier) -> tuple[str, dict[str, object], dict[str, object], bool]:
-    """Name, settings, inputs of the nodes, and whether views show it."""
-    settings = {prop.identifier: getattr(modifier, prop.identifier) for prop in modifier.bl_rna.properties
-                if not prop.is_readonly and prop.identifier not in _SKIPPED and prop.type not in {'COLLECTION'}}
-    inputs = {key: modifier[key] for key in modifier.keys()}
-    return modifier.name, settings, inputs, modifier.show_viewport
+def _copy_modifiers(source: Object, obj: Object, shown: dict[str, bool]) -> None:
+    """Gives an object the modifiers of another, of these names, in their order."""
+    collection, layer = bpy.context.scene.collection, bpy.context.view_layer
+    before, active = [item for item in layer.objects if item.select_get()], layer.objects.active
+    collection.objects.link(source)
+    try:
+        for item in before:
+            item.select_set(False)
+        obj.select_set(True)
+        source.select_set(True)
+        layer.objects.active = source
+        for name in shown:
+            if name not in obj.modifiers:
+                bpy.ops.object.modifier_copy_to_selected(modifier=name)
+    finally:
+        collection.objects.unlink(source)
+        for item in before:
+            item.select_set(True)
+        layer.objects.active = active
+    for name, visible in shown.items():
+        if name in obj.modifiers:
+            obj.modifiers[name].show_viewport = visible
 
 
 def _restore_drivers(source: Object, obj: Object) -> None:

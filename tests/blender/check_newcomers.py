@@ -8,7 +8,7 @@ from check_edits import ROWS, chosen, right_half, scene_with_wall, select
 from check_import import columns, import_ply, write_ply
 from check_panorama import stage
 from check_points import mesh_to_points
-from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, patina, render, reports, sphere
+from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, patina, points_of, render, reports, sphere
 from patina.importers import crs, library
 from patina.operators import points_keys
 
@@ -26,8 +26,8 @@ def test_what_is_not_finite_is_left_out():
         bpy.context.view_layer.update()
         check(np.isfinite(np.array(obj.dimensions)).all() and max(obj.dimensions) < 2.1, f"{kind}: {tuple(obj.dimensions)}")
         if not options:
-            check(len(obj.data.vertices) == len(data[0][2]) - 3, f"{len(obj.data.vertices)} vertices")
-            check(len(obj.data.attributes["intensity"].data) == len(obj.data.vertices), "attributes are as many")
+            check(len(points_of(obj)) == len(data[0][2]) - 3, f"{len(points_of(obj))} vertices")
+            check(len(obj.data.attributes["intensity"].data) == len(points_of(obj)), "attributes are as many")
 
 
 def test_import_selects_the_points_alone():
@@ -149,7 +149,7 @@ def test_columns_of_words_are_left_out():
         check_close(found.positions + np.array(found.origin), [(1.5, 2, 3), (4, 5, 6)], 1e-5, name)
         check(not found.scalars and any(column in warning and "left out" in warning for warning in found.warnings), f"{found.warnings}")
         obj, = import_ply(SCRATCH / name)
-        check(len(obj.data.vertices) == 2, name)
+        check(len(points_of(obj)) == 2, name)
     (SCRATCH / "words.csv").write_text("X,Y,Z\n1,2,3\n4,five,6\n")
     try:
         import_ply(SCRATCH / "words.csv")
@@ -170,8 +170,7 @@ def test_tables_of_spreadsheets():
     for name, text in tables.items():
         (SCRATCH / name).write_text(text)
         obj, = import_ply(SCRATCH / name)
-        found = np.empty((len(obj.data.vertices), 3), np.float32)
-        obj.data.vertices.foreach_get("co", found.ravel())
+        found = points_of(obj)
         check_close(found, rows, 1e-5, name)
     for name, text, word in (("lonlat.csv", "id,lon,lat,elev\n1,2,3,4\n", "no columns x, y and z in its line of names: id, lon, lat, elev"),
                              ("both.csv", "x;y;z\n1.5;2;3\n1,5;2;3\n", "decimals behind a comma")):

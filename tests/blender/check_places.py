@@ -11,7 +11,8 @@ import bpy
 import check_linked  # noqa: F401  no test leaves files with the user
 import numpy as np
 from check_import import columns, import_ply, positions_of, values, write_ply
-from harness import SCRATCH, add_points, check, check_close, failing_render, new_scene, render, reports, sphere
+from harness import SCRATCH, add_points, check, check_close, failing_render, new_scene, points_of, render, reports, sphere
+from mathutils import Vector
 from patina.importers import crs, las, library, origin
 from patina.importers.reading import Filter, Progress
 
@@ -133,9 +134,9 @@ def test_feet_become_metres():
             obj, = import_ply(path, link=link)
             bpy.context.view_layer.update()
             matrix = np.array(obj.matrix_world, np.float64)
-            local = np.array([vertex.co for vertex in obj.data.vertices], np.float64)
+            local = points_of(obj).astype(np.float64)
             if link:
-                size = np.array([vertex.co for vertex in obj.data.vertices]) @ matrix[:3, :3].T
+                size = points_of(obj) @ matrix[:3, :3].T
                 check_close(np.ptp(size, axis=0), np.ptp(wanted, axis=0), 1e-3, f"{name}: the box")
                 continue
             places = local @ matrix[:3, :3].T + matrix[:3, 3]
@@ -166,7 +167,7 @@ def test_feet_lie_beside_metres():
     first, = import_ply(las_file("in_metres.las", metres, wkt=METRES))
     second, = import_ply(las_file("in_feet.las", metres / crs.US_FOOT, wkt=PROJECTED))
     bpy.context.view_layer.update()
-    places = [np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices]) for obj in (first, second)]
+    places = [np.array([obj.matrix_world @ Vector(place) for place in points_of(obj)]) for obj in (first, second)]
     check_close(places[0], places[1], 5e-3, "places")
 
 
@@ -182,7 +183,7 @@ def test_import_by_unit_scale_and_axis():
             new_scene()
             obj, = import_ply(path, link=link, **options)
             bpy.context.view_layer.update()
-            places = np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices])
+            places = np.array([obj.matrix_world @ Vector(place) for place in points_of(obj)])
             if link:
                 check_close((places.min(axis=0), places.max(axis=0)), (wanted.min(axis=0), wanted.max(axis=0)), 1e-5, f"{options}: box")
             else:

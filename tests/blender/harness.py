@@ -59,7 +59,8 @@ def load_addon():
 
 
 patina = load_addon()
-from patina import engine, passes  # noqa: E402
+from patina import engine, importers, passes, point_data  # noqa: E402
+from patina.sync import attributes  # noqa: E402
 
 reports: list[tuple[str, str]] = []  # (kind, message) of the last render
 stats: list[str] = []
@@ -178,6 +179,17 @@ def sphere(count=6000, radius=1.0, center=(0, 0, -4)):
     normals = np.stack([ring * np.cos(angle), ring * np.sin(angle), z], 1)
     colors = np.concatenate([normals * 100 + 128, np.full((count, 1), 255)], 1).astype(np.uint8)
     return normals * radius + np.asarray(center), colors, normals
+
+
+def points_of(obj):
+    """(n, 3) float32: an object's own points, of a mesh or a PointCloud."""
+    count = point_data.count_of(obj.data)
+    return attributes.positions(obj.data, count) if count else np.zeros((0, 3), np.float32)
+
+
+def color_name(obj):
+    """The attribute that an import gives its colors."""
+    return importers.CLOUD_COLOR_NAME if obj.type == 'POINTCLOUD' else importers.COLOR_NAME
 
 
 # ---- pictures ------------------------------------------------------------------------------------------------
