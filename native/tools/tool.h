@@ -21,6 +21,8 @@ int tool_analyse(int count, char **arguments);
 
 // ---- messages, on stderr -----------------------------------------------------------------------------------------
 
+// To standard output, without a line end. Characters that would command a terminal become question marks, as in tool_say.
+void tool_print(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void tool_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 // Wrong use: the sentence and where help is. Returns TOOL_USAGE.
 int tool_misuse(const char *format, ...) __attribute__((format(printf, 1, 2)));
