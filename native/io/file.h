@@ -26,6 +26,8 @@ struct pt_scan {
     double direction[3];    // in which the scanner looked, unit; 0: not known, or all around. Of pt_file_measure_scans, as is
     bool told;              // direction and interval, by the file itself: they are not measured
     double interval;        // the median way from a point to those beside it in the grid; 0: there are none
+    uint64_t missing, surplus; // cells of the grid that never came, and lines behind it, of pt_file_end_scan
+    uint32_t announced[2];     // columns and rows as the file has them
 };
 
 // Immutable once opened. All pointers are owned; a column that the file lacks is NULL.
@@ -91,9 +93,13 @@ void pt_file_measure(struct patina_file *file);
 int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input);
 // Sets direction and interval of all scans. file->position must be placed. PATINA_OK or PATINA_ERROR_MEMORY, without words.
 int pt_file_measure_scans(struct patina_file *file);
-// Says of a file's last scan, which is over, what was wrong with it. missing: cells of its grid that never came, which it has no
-// longer then; surplus: lines that came behind it.
-void pt_file_end_scan(struct patina_file *file, const char *name, uint64_t missing, uint64_t surplus);
+// Ends a file's last scan. missing: cells of its grid that never came; the grid no longer has them then. surplus: lines that came
+// behind the grid.
+void pt_file_end_scan(struct patina_file *file, uint64_t missing, uint64_t surplus);
+// Logs what is wrong with a file's scans: one warning for each kind of fault, however many scans have it.
+void pt_file_tell_scans(const struct patina_file *file, const char *name);
+// Whether a grid is too empty to be one: then nothing takes memory for its cells, whose number a file may invent.
+bool pt_grid_is_empty(uint64_t columns, uint64_t rows, uint64_t points);
 // Whether a matrix, three rows of `stride`, turns: to 1 %, and scaled by whatever is the same along all axes.
 bool pt_turns(const double *matrix, int stride);
 // Takes over the data of a new last attribute.

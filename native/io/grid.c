@@ -202,7 +202,7 @@ static int find_normals(struct pt_grid *g, const struct cells *cells, struct pat
 {
     const struct pt_scan *scan = g->scan;
     uint64_t count = (uint64_t)scan->columns * scan->rows;
-    if (!count)
+    if (!count || pt_grid_is_empty(scan->columns, scan->rows, scan->count))
         return PATINA_OK;
     g->points = malloc(count * sizeof *g->points);
     if (!g->points)
@@ -269,7 +269,7 @@ int patina_grid_normals(const patina_grid_desc *given, patina_progress *progress
         rows = desc->row[i] >= rows ? desc->row[i] + 1ull : rows;
     }
     // A grid that is nearly empty is none, and its numbers may be anything.
-    if (desc->count > UINT32_MAX - 1 || columns > UINT32_MAX || rows > UINT32_MAX || columns * rows > 64 * desc->count + 65536)
+    if (desc->count > UINT32_MAX - 1 || pt_grid_is_empty(columns, rows, desc->count))
         return PATINA_OK;
     scan.columns = (uint32_t)columns;
     scan.rows = (uint32_t)rows;

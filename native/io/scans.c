@@ -3,6 +3,7 @@
 #include "file.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -106,31 +107,97 @@ int pt_file_measure_scans(struct patina_file *file)
         if (scan->told)
             continue;
         measure_direction(file, scan);
-        if (scan->count > 1 && scan->columns && scan->rows && counts(columns) && counts(rows))
+        if (scan->count > 1 && scan->columns && scan->rows && counts(columns) && counts(rows) &&
+            !pt_grid_is_empty(scan->columns, scan->rows, scan->count))
             code = measure(file, scan, columns, rows);
     }
     return code;
 }
 
-void pt_file_end_scan(struct patina_file *file, const char *name, uint64_t missing, uint64_t surplus)
+bool pt_grid_is_empty(uint64_t columns, uint64_t rows, uint64_t points)
 {
-    const uint32_t number = file->scan_count - 1;
-    struct pt_scan *scan = &file->scans[number];
-    if (missing)
-        pt_log(PT_LOG_WARNING, "%s: scan %u ends %llu cells before its grid of %u x %u does", name, number,
-               (unsigned long long)missing, scan->columns, scan->rows);
-    if (surplus)
-        pt_log(PT_LOG_WARNING, "%s: scan %u: %llu lines behind its grid of %u x %u are left out", name, number,
-               (unsigned long long)surplus, scan->columns, scan->rows);
-    if (scan->nowhere)
-        pt_log(PT_LOG_WARNING, "%s: scan %u is left out: its matrix is none of a pose", name, number);
-    else if (scan->count < 2)
-        pt_log(PT_LOG_WARNING, "%s: scan %u has %s", name, number, scan->count ? "one point" : "no points");
+    return columns > UINT32_MAX || rows > UINT32_MAX || columns * rows > 64 * points + 65536;
+}
+
+void pt_file_end_scan(struct patina_file *file, uint64_t missing, uint64_t surplus)
+{
+    struct pt_scan *scan = &file->scans[file->scan_count - 1];
+    scan->missing = missing;
+    scan->surplus = surplus;
+    scan->announced[0] = scan->columns;
+    scan->announced[1] = scan->rows;
     if (!missing)
         return;
     const uint64_t seen = (uint64_t)scan->columns * scan->rows - missing; // no memory for cells that never came
     scan->rows = seen < scan->rows ? (uint32_t)seen : scan->rows;
     scan->columns = scan->rows ? (uint32_t)((seen + scan->rows - 1) / scan->rows) : 0;
+}
+
+// ---- what is wrong with them -----------------------------------------------------------------------------------------
+
+enum fault { CUT, SURPLUS, NO_POSE, FEW, FAULTS };
+enum { LISTED = 5 }; // scans that a warning names
+
+static uint64_t amount(const struct pt_scan *scan, enum fault fault)
+{
+    switch (fault) {
+    case CUT: return scan->missing;
+    case SURPLUS: return scan->surplus;
+    case NO_POSE: return scan->nowhere;
+    default: return !scan->nowhere && scan->count < 2;
+    }
+}
+
+static void tell_one(const struct pt_scan *scan, const char *name, uint32_t number, enum fault fault)
+{
+    if (fault == CUT)
+        pt_log(PT_LOG_WARNING, "%s: scan %u ends %llu cells before its grid of %u x %u does", name, number,
+               (unsigned long long)scan->missing, scan->announced[0], scan->announced[1]);
+    else if (fault == SURPLUS)
+        pt_log(PT_LOG_WARNING, "%s: scan %u: %llu lines behind its grid of %u x %u are left out", name, number,
+               (unsigned long long)scan->surplus, scan->announced[0], scan->announced[1]);
+    else if (fault == NO_POSE)
+        pt_log(PT_LOG_WARNING, "%s: scan %u is left out: its matrix is none of a pose", name, number);
+    else
+        pt_log(PT_LOG_WARNING, "%s: scan %u has %s", name, number, scan->count ? "one point" : "no points");
+}
+
+static void tell_several(const char *name, enum fault fault, uint32_t count, uint64_t sum, const char *numbers)
+{
+    if (fault == CUT)
+        pt_log(PT_LOG_WARNING, "%s: %u scans end before their grids do, by %llu cells in all: %s", name, count,
+               (unsigned long long)sum, numbers);
+    else if (fault == SURPLUS)
+        pt_log(PT_LOG_WARNING, "%s: %u scans have lines behind their grids, which are left out, %llu in all: %s", name, count,
+               (unsigned long long)sum, numbers);
+    else if (fault == NO_POSE)
+        pt_log(PT_LOG_WARNING, "%s: %u scans are left out, because their matrices are none of a pose: %s", name, count,
+               numbers);
+    else
+        pt_log(PT_LOG_WARNING, "%s: %u scans have one point or none: %s", name, count, numbers);
+}
+
+void pt_file_tell_scans(const struct patina_file *file, const char *name)
+{
+    for (enum fault fault = 0; fault < FAULTS; fault++) {
+        char numbers[96] = ""; // LISTED of ten digits
+        uint32_t found = 0, last = 0;
+        uint64_t sum = 0;
+        for (uint32_t s = 0; s < file->scan_count; s++) {
+            const uint64_t of = amount(&file->scans[s], fault);
+            if (!of)
+                continue;
+            if (found < LISTED)
+                snprintf(numbers + strlen(numbers), sizeof numbers - strlen(numbers), "%s%u", found ? ", " : "scans ", s);
+            found++;
+            sum += of;
+            last = s;
+        }
+        if (found == 1)
+            tell_one(&file->scans[last], name, last, fault);
+        else if (found)
+            tell_several(name, fault, found, sum, found > LISTED ? strcat(numbers, ", ...") : numbers);
+    }
 }
 
 bool pt_turns(const double *m, int stride)

@@ -62,10 +62,12 @@ struct text {
     double *staged;
     float **attributes; // a column each, in the order of the columns
     // Of a PTX:
-    uint32_t most;   // columns or rows of a grid, or scans
-    uint32_t scans;  // that were begun
-    uint32_t room;   // of file->scans
-    void *places[3]; // each point's scan, column and row, from 0: uint16, or uint32 where `most` does not fit
+    double announced;      // of a PTS: points, by the lines with a single number
+    uint64_t announced_at; // the first of these lines
+    uint32_t most;         // columns or rows of a grid, or scans
+    uint32_t scans;        // that were begun
+    uint32_t room;         // of file->scans
+    void *places[3];       // each point's scan, column and row, from 0: uint16, or uint32 where `most` does not fit
 };
 
 // ---- lines -----------------------------------------------------------------------------------------------------------
@@ -185,49 +187,69 @@ struct scan {
     double matrix[16]; // as in the file: rows of the transposed
 };
 
-// Reads "columns, rows, position, three axes, four rows of a matrix"; false when the lines are not that.
-static bool read_scan(struct text *t, struct scan *scan)
+// Reads "columns, rows, position, three axes, four rows of a matrix". Returns how many of the ten lines are that; size: the two numbers
+// of the first two. Ten: the caller checks the numbers.
+static int read_head(struct text *t, struct scan *scan, double size[2], uint64_t *line_of_head)
 {
-    double values[MOST_COLUMNS], size[2] = {0};
+    double values[MOST_COLUMNS];
+    size[0] = size[1] = 0;
     for (int i = 0; i < 10; i++) {
         uint32_t wanted = i < 2 ? 1 : i < 6 ? 3 : 4;
         if (!find_line(t))
-            return false;
+            return i;
+        *line_of_head = i ? *line_of_head : t->line;
         struct pt_line line = read_line(t, values);
         if (line.count != wanted || line.strange)
-            return false;
+            return i;
         if (i < 2)
             size[i] = values[0];
         else if (i >= 6)
             memcpy(scan->matrix + 4 * (i - 6), values, 4 * sizeof *values);
     }
+    return 10;
+}
+
+// Whether there is a scan's head. An error where it has a head's lines, but numbers of columns and rows that no grid has.
+static int read_scan(struct text *t, struct scan *scan, bool *found)
+{
+    double size[2];
+    uint64_t line = t->line;
+    *found = read_head(t, scan, size, &line) == 10;
+    if (!*found)
+        return PATINA_OK;
     if (!(size[0] >= 0 && size[1] >= 0 && size[0] < 4294967295.0 && size[1] < 4294967295.0 &&
-          size[0] * size[1] < 4294967295.0 && size[0] == floor(size[0]) && size[1] == floor(size[1])))
-        return false;
+          size[0] * size[1] < 4294967295.0 && size[0] == floor(size[0]) && size[1] == floor(size[1]))) {
+        return pt_fail(
+            NULL, PATINA_ERROR_FORMAT,
+            "%s: line %llu: scan %u announces a grid of %.10g columns and %.10g rows: whole numbers, with fewer than 2^32 "
+            "cells, are needed",
+            t->input->name, (unsigned long long)line, t->scans, size[0], size[1]);
+    }
     scan->columns = (uint32_t)size[0];
     scan->rows = (uint32_t)size[1];
     scan->left = (uint64_t)scan->columns * scan->rows;
     scan->cell = scan->surplus = 0;
     const double *place = scan->matrix + 12;
     scan->bad = !pt_turns(scan->matrix, 4) || !isfinite(place[0] + place[1] + place[2]);
-    return true;
+    return PATINA_OK;
 }
 
 // The same; where it is none, t->at stays.
-static bool try_scan(struct text *t, struct scan *scan)
+static int try_scan(struct text *t, struct scan *scan, bool *is_one)
 {
     const uint8_t *at = t->at;
     const uint64_t line = t->line;
     const uint32_t breaks = t->breaks;
     struct scan found = {0};
-    if (read_scan(t, &found)) {
+    const int code = read_scan(t, &found, is_one);
+    if (code || *is_one) {
         *scan = found;
-        return true;
+        return code;
     }
     t->at = at;
     t->line = line;
     t->breaks = breaks;
-    return false;
+    return PATINA_OK;
 }
 
 static int keep_scan(struct text *t, const struct scan *scan, uint64_t first)
@@ -382,13 +404,17 @@ static int next_scan(struct text *t, struct scan *scan, bool storing, uint64_t i
 {
     const struct scan before = *scan;
     double values[MOST_COLUMNS];
-    if (!try_scan(t, scan)) { // more lines than the grid has cells
+    bool is_one;
+    const int code = try_scan(t, scan, &is_one);
+    if (code)
+        return code;
+    if (!is_one) { // more lines than the grid has cells
         scan->surplus++;
         read_line(t, values);
         return PATINA_OK;
     }
     if (storing && t->scans)
-        pt_file_end_scan(t->file, t->input->name, before.left, before.surplus);
+        pt_file_end_scan(t->file, before.left, before.surplus);
     t->scans++;
     t->most = scan->columns > t->most ? scan->columns : t->most;
     t->most = scan->rows > t->most ? scan->rows : t->most;
@@ -418,8 +444,13 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
         }
         const uint8_t *start = t->at;
         struct pt_line line = read_line(t, values);
-        if (t->pts && line.count == 1 && !line.strange)
-            continue; // how many points follow: the lines say it themselves
+        if (t->pts && line.count == 1 && !line.strange) { // how many points follow
+            if (!storing) {
+                t->announced += values[0];
+                t->announced_at = t->announced_at ? t->announced_at : t->line;
+            }
+            continue;
+        }
         if (line.empty && line.empty == line.width)
             continue; // a table's last lines
         if (t->ptx && t->at == t->end && line.count < t->columns)
@@ -448,7 +479,9 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
         i++;
     }
     if (storing && t->scans)
-        pt_file_end_scan(t->file, t->input->name, scan.left, scan.surplus);
+        pt_file_end_scan(t->file, scan.left, scan.surplus);
+    if (storing)
+        pt_file_tell_scans(t->file, t->input->name);
     *count = i;
     return PATINA_OK;
 }
@@ -549,6 +582,35 @@ static int fail_names(const struct text *t)
                    c < t->name_count ? ", ..." : "");
 }
 
+// A file that begins as a PTX does, but whose first head is none: its lines would become points. A PTS has one number before its points,
+// or several where there are none.
+static int refuse_broken_head(struct text *t, const uint8_t *first, uint64_t line)
+{
+    double size[2];
+    struct scan scan;
+    uint64_t head;
+    rewind_text(t, first, line);
+    const int lines = read_head(t, &scan, size, &head);
+    const uint64_t broken = t->line;
+    const bool ended = !find_line(t);
+    rewind_text(t, first, line);
+    if (lines < 2 || (lines == 2 && ended) || size[0] == 0)
+        return PATINA_OK;
+    return pt_fail(NULL, PATINA_ERROR_FORMAT,
+                   "%s: line %llu: the head of scan 0 is broken: behind its columns and rows, four lines of three numbers and "
+                   "four of four "
+                   "are needed",
+                   t->input->name, (unsigned long long)broken);
+}
+
+// Logs where a PTS announces another number of points than it holds.
+static void compare_announced(const struct text *t)
+{
+    if (t->pts && t->announced_at && !(t->announced == (double)t->file->count))
+        pt_log(PT_LOG_WARNING, "%s: line %llu announces %.15g points, the file holds %llu", t->input->name,
+               (unsigned long long)t->announced_at, t->announced, (unsigned long long)t->file->count);
+}
+
 // Looks at the first lines: which of the formats this is, and where its rows begin.
 static int look(struct text *t, const uint8_t **body, uint64_t *line)
 {
@@ -563,14 +625,14 @@ static int look(struct text *t, const uint8_t **body, uint64_t *line)
         t->at--; // a table's first cell may be empty
     const uint8_t *first = *body = t->at;
     *line = t->line;
-    t->ptx = read_scan(t, &scan);
+    const int code = read_scan(t, &scan, &t->ptx);
     rewind_text(t, first, *line);
-    if (t->ptx)
-        return PATINA_OK;
+    if (code || t->ptx)
+        return code;
     struct pt_line words = read_line(t, values);
     t->pts = words.count == 1 && !words.strange;
     if (t->pts)
-        return PATINA_OK;
+        return refuse_broken_head(t, first, *line);
     t->cells.parting = pt_cells_look(first, t->end);
     t->at = first;
     words = read_line(t, values);
@@ -707,6 +769,7 @@ static int read_all(struct text *t)
         code = walk(t, false, sample, &t->file->count);
     }
     if (!code) {
+        compare_announced(t);
         t->line = line;
         code = decide_words(t, sample);
     }

@@ -177,10 +177,12 @@ static int take_scalars(const patina_file *file, const struct tool_color *color,
 int tool_begins(const char *path, const char *bytes, size_t size)
 {
     char start[16];
-    FILE *file = size <= sizeof start ? pt_stream_open(path, "rb") : NULL;
-    const int read = file && fread(start, size, 1, file) == 1;
-    if (file)
-        fclose(file);
+    struct pt_disk disk; // opening a named pipe as a stream would wait for who writes into it
+    size_t got = 0;
+    if (size > sizeof start || pt_disk_open(path, &disk))
+        return 0;
+    const int read = disk.kind == PT_DISK_FILE && !pt_disk_read(&disk, 0, start, size, &got) && got == size;
+    pt_disk_close(&disk);
     return read && !memcmp(start, bytes, size);
 }
 

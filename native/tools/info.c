@@ -12,7 +12,8 @@ static const char *type_name(uint32_t type)
 
 static void print_file(const patina_file_info *info)
 {
-    printf("format      %s\n", info->format);
+    tool_print("format      %s", info->format);
+    printf("\n");
     printf("points      %llu\n", (unsigned long long)info->count);
     printf("positions   %s\n", type_name(info->position_type));
     if (info->invalid_positions)
@@ -37,7 +38,8 @@ static void print_attributes(const patina_file *file, uint32_t count)
         patina_file_attribute attribute = {.struct_size = sizeof attribute};
         if (patina_file_get_attribute(file, i, &attribute))
             continue;
-        printf("attribute   %s (%s)\n", attribute.name, type_name(attribute.type));
+        tool_print("attribute   %s (%s)", attribute.name, type_name(attribute.type));
+        printf("\n");
     }
 }
 
@@ -47,7 +49,7 @@ static void print_scans(const patina_file *file, uint32_t count)
         patina_file_scan scan = {.struct_size = sizeof scan};
         if (patina_file_get_scan(file, i, &scan))
             continue;
-        printf("scan %-6u %s%s%llu points", i, scan.name, scan.name[0] ? ", " : "", (unsigned long long)scan.count);
+        tool_print("scan %-6u %s%s%llu points", i, scan.name, scan.name[0] ? ", " : "", (unsigned long long)scan.count);
         if (scan.columns)
             printf(", grid %u x %u", scan.columns, scan.rows);
         if (scan.interval > 0)

@@ -10,11 +10,39 @@
 
 // ---- messages ----------------------------------------------------------------------------------------------------
 
+// Replaces what would command a terminal, or turn the order of what is read: control characters, and UTF-8's marks of direction.
+static void clean(char *text)
+{
+    for (unsigned char *at = (unsigned char *)text; *at; at++) {
+        const int control = *at < 0x20 || *at == 0x7F, upper = at[0] == 0xC2 && at[1] >= 0x80 && at[1] < 0xA0;
+        const int mark = at[0] == 0xE2 &&
+                         ((at[1] == 0x80 && ((at[2] >= 0xAA && at[2] <= 0xAE) || at[2] == 0x8E || at[2] == 0x8F)) ||
+                          (at[1] == 0x81 && at[2] >= 0xA6 && at[2] <= 0xA9));
+        memset(at, '?', control ? 1 : upper ? 2 : mark ? 3 : 0);
+    }
+}
+
+static void print_clean(FILE *out, const char *format, va_list list)
+{
+    char line[4096];
+    vsnprintf(line, sizeof line, format, list);
+    clean(line);
+    fputs(line, out);
+}
+
 static void say(const char *format, va_list list)
 {
     fputs("patina: ", stderr);
-    vfprintf(stderr, format, list);
+    print_clean(stderr, format, list);
     fputc('\n', stderr);
+}
+
+void tool_print(const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    print_clean(stdout, format, list);
+    va_end(list);
 }
 
 void tool_say(const char *format, ...)

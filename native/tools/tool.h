@@ -25,6 +25,8 @@ void tool_print_usage(FILE *out);
 
 // ---- messages, on stderr -----------------------------------------------------------------------------------------
 
+// To standard output, without a line end. Characters that would command a terminal become question marks, as in tool_say.
+void tool_print(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void tool_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 // Wrong use: the sentence and where help is. Returns TOOL_USAGE.
 int tool_misuse(const char *format, ...) __attribute__((format(printf, 1, 2)));

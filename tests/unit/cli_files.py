@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files of points on the command line: tests that test_cli.py, the script that runs, takes in."""
 
+import os
 import random
 import struct
 import subprocess
@@ -52,6 +53,29 @@ def test_unwritable_output():
     cli.ball("unwritable.ply", 100)
     assert "no/such" in cli.run("render", "unwritable.ply", "-o", "no/such/x.png", code=1).stderr
     cli.run("convert", "unwritable.ply", "no/such/x.ply", code=1)
+
+
+def test_named_pipes_are_no_files():
+    """A pipe that nobody writes into must not hang a command."""
+    if os.name == "nt":
+        return
+    for name in ("pipe.ply", "pipe.xyz", "pipe.cloud"):
+        os.mkfifo(cli.FOLDER / name)
+        for command in (("info", name), ("render", name, "-o", "pipe.png"), ("convert", name, "out.ply")):
+            assert "is a device or pipe, not a file" in cli.run(*command, code=1).stderr, command
+
+
+def test_names_cannot_command_a_terminal():
+    """Control characters and marks of direction in names are shown as question marks."""
+    evil = "a\x1b[31m\x07\x7f\u009b\u202eb"
+    (cli.FOLDER / "evil.csv").write_text(f"x,y,z,{evil}\n1,2,3,4\n", encoding="utf-8")
+    (cli.FOLDER / "evil.ply").write_text(f"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+                                         f"property float {evil}\nend_header\n1 2 3 4\n", encoding="utf-8")
+    for name in ("evil.csv", "evil.ply"):
+        done = cli.run("info", name)
+        assert "attribute   a?[31m" in done.stdout and not set("\x1b\x07\x7f\u009b\u202e") & set(done.stdout + done.stderr), ascii(done.stdout)
+    done = cli.run("info", f"{evil}.ply", code=1)
+    assert not set("\x1b\x07\x7f\u009b\u202e") & set(done.stderr), ascii(done.stderr)
 
 
 def test_info():

@@ -362,6 +362,67 @@ static void test_bad_scans(void **state)
     expect_scans(good, 2, first, NULL);
 }
 
+// Several scans with one fault give one warning.
+static void test_bad_scans_are_joined(void **state)
+{
+    (void)state;
+    static const char bad[] = PTX_HEAD("1", "2", "0 0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 1\n") "1 2 3 0.5\n1 2 4 0.5\n";
+    static const char cut[] = PTX_HEAD("3", "2", PTX_PLAIN) "1 2 3 0.5\n1 2 4 0.5\n";
+    char text[4096] = PTX_HEAD("1", "2", PTX_PLAIN) "1 2 3 0.5\n4 5 6 0.5\n";
+    const float first[] = {0, 0}, several[] = {0, 0, 7, 7, 8, 8};
+    for (int i = 0; i < 6; i++)
+        strcat(text, bad);
+    expect_scans(text, 2, first, "6 scans are left out, because their matrices are none of a pose: scans 1, 2, 3, 4, 5, ...\n");
+    strcat(text, cut);
+    strcat(text, cut);
+    expect_scans(text, 6, several, "2 scans end before their grids do, by 8 cells in all: scans 7, 8\n");
+}
+
+// A head whose numbers no grid has, or whose lines are not a head's, is told by scan and line: it must not become points.
+static void test_bad_heads(void **state)
+{
+    (void)state;
+    static const char *const sizes[][2] = {{"-1", "5"},
+                                           {"5", "-1"},
+                                           {"4294967296", "4294967296"},
+                                           {"1000000000", "1000000000"},
+                                           {"1e30", "1"},
+                                           {"nan", "inf"},
+                                           {"1.5", "2"},
+                                           {"65536", "65536"}};
+    static const char good[] = PTX_HEAD("1", "2", PTX_PLAIN) "1 2 3 0.5\n4 5 6 0.5\n",
+                      rest[] = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n" PTX_PLAIN;
+    char text[1024];
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        snprintf(text, sizeof text, "%s\n%s\n%s1 2 3 0.5\n2 3 4 0.5\n", sizes[i][0], sizes[i][1], rest);
+        refuse(text, "line 1: scan 0 announces a grid of ");
+        snprintf(text, sizeof text, "%s%s\n%s\n%s1 2 3 0.5\n2 3 4 0.5\n", good, sizes[i][0], sizes[i][1], rest);
+        refuse(text, "line 13: scan 1 announces a grid of ");
+    }
+    refuse("2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0\n0 1 0 0\n1 2 3 0.5\n", "line 7: the head of scan 0 is broken");
+    refuse("2\n2\n0 0 0 0\n1 2 3 0.5\n", "line 3: the head of scan 0 is broken");
+}
+
+// A PTS that holds another number of points than it announces has those that are there, and a warning with both numbers.
+static void test_announced_points(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *said;
+    } cases[] = {{"1000000000\n1 2 3 4 5 6 7\n", "line 1 announces 1000000000 points, the file holds 1\n"},
+                 {"-5\n1 2 3 4 5 6 7\n", "line 1 announces -5 points, the file holds 1\n"},
+                 {"nan\n1 2 3 4 5 6 7\n", "announces nan points"},
+                 {"1\n1 2 3 4 5 6 7\n1 2 3 4 5 6 7\n", "line 1 announces 1 points, the file holds 2\n"},
+                 {"1\n1 2 3 4 5 6 7\n2\n1 2 3 4 5 6 7\n3 2 3 4 5 6 7\n", NULL}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        take_log();
+        patina_file_destroy(read(cases[i].text));
+        const char *said = take_log();
+        if (cases[i].said ? !strstr(said, cases[i].said) : *said)
+            fail_msg("'%s' is not in '%s'", cases[i].said ? cases[i].said : "nothing", said);
+    }
+}
+
 // What the scans themselves are: place, direction and interval of each.
 static void test_scans_of_ptx(void **state)
 {
@@ -514,12 +575,26 @@ static void test_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_columns),        cmocka_unit_test(test_values),       cmocka_unit_test(test_decimal_commas),
-        cmocka_unit_test(test_tables),         cmocka_unit_test(test_words),        cmocka_unit_test(test_first_row_of_nan),
-        cmocka_unit_test(test_bad_scans),      cmocka_unit_test(test_scans_of_ptx), cmocka_unit_test(test_ptx),
-        cmocka_unit_test(test_ptx_grid),       cmocka_unit_test(test_grid_normals), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_words_met_late), cmocka_unit_test(test_stray_words),  cmocka_unit_test(test_point_numbers),
-        cmocka_unit_test(test_headers),        cmocka_unit_test(test_quoted_lines),
+        cmocka_unit_test(test_columns),
+        cmocka_unit_test(test_values),
+        cmocka_unit_test(test_decimal_commas),
+        cmocka_unit_test(test_tables),
+        cmocka_unit_test(test_words),
+        cmocka_unit_test(test_first_row_of_nan),
+        cmocka_unit_test(test_bad_scans),
+        cmocka_unit_test(test_scans_of_ptx),
+        cmocka_unit_test(test_ptx),
+        cmocka_unit_test(test_ptx_grid),
+        cmocka_unit_test(test_grid_normals),
+        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_words_met_late),
+        cmocka_unit_test(test_stray_words),
+        cmocka_unit_test(test_point_numbers),
+        cmocka_unit_test(test_headers),
+        cmocka_unit_test(test_quoted_lines),
+        cmocka_unit_test(test_bad_scans_are_joined),
+        cmocka_unit_test(test_bad_heads),
+        cmocka_unit_test(test_announced_points),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
