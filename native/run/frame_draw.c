@@ -178,9 +178,10 @@ int pt_frame_until_sound(struct patina_frame *frame, const struct patina_scene *
                          const void *of)
 {
     int error;
-    do
+    do {
+        pt_pager_prepare(&frame->pager, scene);
         error = once(frame, scene, of);
-    while (error == PT_AGAIN);
+    } while (error == PT_AGAIN);
     for (uint32_t i = 0; i < scene->cloud_count; i++)
         pt_pages_tell_lost(scene->instances[i].whole);
     if (error == PATINA_ERROR_CANCELLED)

@@ -199,6 +199,14 @@ static uint32_t lost_pages(const struct patina_scene *scene)
     return lost;
 }
 
+void pt_pager_prepare(struct pt_pager *pager, const struct patina_scene *scene)
+{
+    if (mapped_bytes(scene))
+        pt_disk_watch();
+    pager->losses = pt_disk_losses();
+    pager->lost = lost_pages(scene);
+}
+
 int pt_pager_lose(struct pt_pager *pager)
 {
     const uint64_t losses = pt_disk_losses(); // before they are looked for: those that come meanwhile are found next time
@@ -215,10 +223,8 @@ int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const st
     pager->device = device;
     pager->scene = scene;
     pager->mapped = mapped_bytes(scene);
-    if (pager->mapped)
-        pt_disk_watch();
-    pager->losses = pt_disk_losses();
-    pager->lost = lost_pages(scene);
+    if (pt_pager_lose(pager)) // since the plan was begun, which has them all
+        return PT_AGAIN;
     pager->cap = cap_for(device, scene, pager->mapped, &pager->round);
     const int error = device->copies ? open_copies(pager, device) : PATINA_OK;
     if (error)

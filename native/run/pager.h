@@ -25,6 +25,8 @@ struct pt_pager {
 };
 
 // Pages that are read for the first time are looked at: what begins, opens and runs may return PT_AGAIN (page_check.h).
+// Before anything is planned: notes which pages are lost.
+void pt_pager_prepare(struct pt_pager *pager, const struct patina_scene *scene);
 // Finds the cap: the device's, or of the memory that is free. PATINA_ERROR_MEMORY, with its message at the device, where this copies
 // clouds and they exceed a cap that was given. What was counted goes on.
 int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const struct patina_scene *scene);

@@ -141,6 +141,8 @@ static int is_good(const struct patina_cloud *cloud, uint32_t c, enum pt_array a
     return fold(sum) == cloud->page_sums->sums[(size_t)page * PT_SUMMED + (size_t)array - 1];
 }
 
+enum { PT_LOST_BESIDE = 1 << 16 };
+
 static int is_lost(const struct patina_cloud *cloud, uint32_t c)
 {
     int lost = 0;
@@ -148,7 +150,8 @@ static int is_lost(const struct patina_cloud *cloud, uint32_t c)
         if (cloud->mapped >> i & 1u) {
             size_t size;
             const char *data = bytes_of(cloud, c, (enum pt_array)i, &size);
-            lost = pt_pages_lost(data, size);
+            // the last page of a file that was cut ends in zeros, right before the first that is lost
+            lost = pt_pages_lost(data, size + PT_LOST_BESIDE);
         }
     return lost;
 }

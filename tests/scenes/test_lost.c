@@ -239,11 +239,13 @@ static void cut_meanwhile(patina_device *device, const char *name)
         struct cutting cutting = {pcg_u32(&random) % 40000, pcg_unit(&random) * 0.9};
         CHECK(patina_frame_create(device, &frame), device);
         assert_int_equal(pt_thread_start(&thread, cut_later, &cutting, 0), 0);
-        draw(frame, scene, &first);
+        const uint64_t at_first = draw(frame, scene, &first);
         pt_thread_join(&thread);
         const uint64_t lost = draw(frame, scene, &second);
         lost_some += lost > 0;
-        draw(frame, scene, &third); // nothing changes any more
+        const uint64_t more = draw(frame, scene, &third); // nothing changes any more
+        printf("  %u: after %u us to %.3f: %llu, %llu and %llu are lost\n", round, cutting.microseconds, cutting.share,
+               (unsigned long long)at_first, (unsigned long long)lost, (unsigned long long)more);
         assert_memory_equal(third.combined, second.combined, WIDTH * HEIGHT * 4 * sizeof *third.combined);
         char log[4096];
         const int lines = support_drain_log(log, sizeof log);
