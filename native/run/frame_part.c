@@ -237,8 +237,7 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
     struct part_job job = {.frame = frame, .scene = scene, .part = part, .planes = {.varies = 1}};
     struct pt_keys_head head;
     frame->times.count = 0;
-    frame->pager = (struct pt_pager){
-        .cancel = &frame->cancel, .losses = frame->pager.losses, .lost = frame->pager.lost};
+    frame->pager = (struct pt_pager){.cancel = &frame->cancel, .losses = frame->pager.losses, .lost = frame->pager.lost};
     int error = pt_plan_create(scene, frame->device->pool, &job.plan);
     if (error)
         return error;

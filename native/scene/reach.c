@@ -67,9 +67,8 @@ double pt_ball_reach(const struct patina_scene *scene, const struct pt_instance 
 double pt_chunk_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_chunk *chunk,
                       double scale)
 {
-    const int discs = !pt_all_soft(instance) &&
-                      (scene->settings.surface == PATINA_SURFACE_SPLATS ||
-                       (scene->settings.surface == PATINA_SURFACE_AUTO && instance->cloud->shapes));
+    const int discs = !pt_all_soft(instance) && (scene->settings.surface == PATINA_SURFACE_SPLATS ||
+                                                 (scene->settings.surface == PATINA_SURFACE_AUTO && instance->cloud->shapes));
     const double disc = discs ? pt_disc_reach(scene, instance, chunk, scale, 1) : 0.0,
                  ball = instance->style.soft ? pt_ball_reach(scene, instance, chunk, scale) : 0.0;
     return fmax(disc, ball);

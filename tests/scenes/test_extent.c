@@ -19,8 +19,12 @@ struct layout {
 
 static struct layout layout_at(int which)
 {
-    struct layout layout = {.name = which == 0 ? "one ball" : which == 1 ? "two at one place" : "one in each corner",
-                            .count = which == 0 ? 1 : which == 1 ? 2 : 8,
+    struct layout layout = {.name = which == 0   ? "one ball"
+                                    : which == 1 ? "two at one place"
+                                                 : "one in each corner",
+                            .count = which == 0   ? 1
+                                     : which == 1 ? 2
+                                                  : 8,
                             .radius = which == 2 ? 0.25 : 1.5};
     for (uint32_t i = 0; i < layout.count; i++)
         for (int k = 0; k < 3; k++)
@@ -99,7 +103,8 @@ static double through_at(const struct layout *layout, const patina_camera *camer
     return through;
 }
 
-static void hold(patina_device *device, const char *name, int which, int parallel, uint32_t model, double opacity, int own_radii)
+static void hold(patina_device *device, const char *name, int which, int parallel, uint32_t model, double opacity,
+                 int own_radii)
 {
     const struct layout layout = layout_at(which);
     patina_cloud *cloud = upload(&layout, own_radii);

@@ -98,14 +98,19 @@ static patina_scene *scene_as(const patina_cloud *cloud, enum how how)
     return scene;
 }
 
-// Renders, and returns points that are lost.
-static uint64_t draw(patina_frame *frame, const patina_scene *scene, struct picture *picture)
+// Renders, and returns points that are lost. Keys are read unless the file may be cut any moment: their numbers come from it.
+static uint64_t draw_some(patina_frame *frame, const patina_scene *scene, int keys, struct picture *picture)
 {
     patina_frame_stats stats = {.struct_size = sizeof stats};
     CHECK(patina_frame_render(frame, scene), frame);
     CHECK(patina_frame_get_stats(frame, &stats), frame);
-    *picture = picture_read(frame);
+    *picture = keys ? picture_read(frame) : picture_read_passes(frame);
     return stats.points_lost;
+}
+
+static uint64_t draw(patina_frame *frame, const patina_scene *scene, struct picture *picture)
+{
+    return draw_some(frame, scene, 1, picture);
 }
 
 // The log's lines, of which `lines` are wanted, each with the file's name.
@@ -151,7 +156,8 @@ static void cut_between(patina_device *plain, const char *name)
 {
     (void)plain;
     for (int capped = 0; capped < 2; capped++)
-        for (enum how how = PLAIN; how < (support_is_gl(name) ? SPLATS : HOW_MANY); how++) // software takes long over the others
+        for (enum how how = PLAIN; how < (support_is_gl(name) ? SPLATS : HOW_MANY);
+             how++) // software takes long over the others
             for (int half = 0; half < 2; half++) {
                 renew();
                 patina_device *device = device_with(name, capped ? CAP : 0);
@@ -239,11 +245,11 @@ static void cut_meanwhile(patina_device *device, const char *name)
         struct cutting cutting = {pcg_u32(&random) % 40000, pcg_unit(&random) * 0.9};
         CHECK(patina_frame_create(device, &frame), device);
         assert_int_equal(pt_thread_start(&thread, cut_later, &cutting, 0), 0);
-        const uint64_t at_first = draw(frame, scene, &first);
+        const uint64_t at_first = draw_some(frame, scene, 0, &first);
         pt_thread_join(&thread);
-        const uint64_t lost = draw(frame, scene, &second);
+        const uint64_t lost = draw_some(frame, scene, 0, &second);
         lost_some += lost > 0;
-        const uint64_t more = draw(frame, scene, &third); // nothing changes any more
+        const uint64_t more = draw_some(frame, scene, 0, &third); // nothing changes any more
         printf("  %u: after %u us to %.3f: %llu, %llu and %llu are lost\n", round, cutting.microseconds, cutting.share,
                (unsigned long long)at_first, (unsigned long long)lost, (unsigned long long)more);
         assert_memory_equal(third.combined, second.combined, WIDTH * HEIGHT * 4 * sizeof *third.combined);
@@ -254,6 +260,10 @@ static void cut_meanwhile(patina_device *device, const char *name)
         picture_free(&first);
         picture_free(&second);
         picture_free(&third);
+        uint64_t keys[WIDTH * HEIGHT];
+        const int read = patina_frame_read_keys(frame, keys, sizeof keys);
+        assert_true(read == PATINA_OK || read == PATINA_ERROR_FILE);
+        support_drain_log(log, sizeof log);
         patina_frame_destroy(frame);
         patina_scene_destroy(scene);
         patina_cloud_destroy(cloud);
@@ -332,7 +342,9 @@ static void test_tables(void **state)
     char log[4096];
     FILE *stream = fopen(other, "wb");
     enum { ROWS = 400000 };
-    fprintf(stream, "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+    fprintf(stream,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float "
+            "z\nend_header\n",
             ROWS);
     for (int i = 0; i < ROWS; i++) {
         const float p[3] = {(float)i, 1.0f, 2.0f};

@@ -45,12 +45,12 @@ def declarations() -> dict[str, list[tuple[str, str]]]:
     found = {}
     for header in sorted((ROOT / "native/include/patina").glob("*.h")):
         text = re.sub(r"//[^\n]*", "", header.read_text(encoding="utf-8"))
-        for name, inside in re.findall(r"PATINA_API[^;(]*?\b(patina_\w+)\(([^;]*)\);", text):
+        for name, inside in re.findall(r"^PATINA_API [^;(#]*?\b(patina_\w+)\(([^;]*?)\);", text, re.M):
             parameters = []
             for each in inside.replace("\n", " ").split(","):
                 words = each.strip()
                 if words != "void":
-                    own = re.search(r"(\w+)(\[\d*\])?$", words)
+                    own = re.search(r"(\w+)((?:\[\w*\])*)$", words)
                     parameters.append((words[:own.start()].strip() + ("*" if own.group(2) else ""), own.group(1)))
             found[name] = parameters
     return found
@@ -90,7 +90,7 @@ class Stage:
                                   "color": (self.bytes, "UINT8", 3), "opacity": (self.singles, "FLOAT32", 1),
                                   "scalar": (self.singles, "FLOAT32", 1), "classes": (self.bytes, "UINT8", 1),
                                   "radius": (self.singles, "FLOAT32", 1), "uv": (self.singles, "FLOAT32", 2),
-                                  "pixels": (self.bytes, "UINT8", 4)}[what]
+                                  "pixels": (self.bytes, "UINT8", 4), "tint": (self.singles, "FLOAT32", 3)}[what]
         return abi.Array(ctypes.addressof(data), abi.TYPE[kind], components, 0)
 
     def descriptor(self, kind: str) -> ctypes.Structure:
@@ -122,7 +122,7 @@ class Stage:
 
     def _mesh_desc(self) -> abi.MeshDesc:
         return abi.MeshDesc(vertex_count=POINTS, position=self.array("position"), normal=self.array("normal"),
-                            color=self.array("color"), triangle_count=20, indices=ctypes.addressof(self.indices), uv=self.array("uv"))
+                            color=self.array("tint"), triangle_count=20, indices=ctypes.addressof(self.indices), uv=self.array("uv"))
 
     def _texture_desc(self) -> abi.TextureDesc:
         return abi.TextureDesc(width=8, height=8, pixels=self.array("pixels"))
