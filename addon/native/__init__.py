@@ -291,6 +291,7 @@ class Cloud(_Handle):
         self.seen_through = info.seen_through  # points that a station saw through
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))
+        self.radius_most = info.radius_most  # of points' own radii, object units; 0: they have none
 
     def start_colors(self, colors: np.ndarray | None) -> Task:
         """Other colours for the same points; no picture of them may be drawn meanwhile."""

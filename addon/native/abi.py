@@ -183,7 +183,8 @@ class FrameStats(Descriptor):
                 ("shadow_samples", c_uint32), ("shadow_error", c_float), ("chunks_clipped", c_uint64),
                 ("chunks_cut", c_uint64), ("pixel_samples", c_uint32), ("pixel_pending", c_uint32),
                 ("pixel_error", c_float), ("mapped_bytes", c_uint64), ("mapped_cap", c_uint64), ("mapped_held", c_uint64),
-                ("mapped_read", c_uint64), ("mapped_rounds", c_uint32), ("mapped_returned", c_uint32)]
+                ("mapped_read", c_uint64), ("mapped_rounds", c_uint32), ("mapped_returned", c_uint32),
+                ("points_lost", c_uint64)]
 
 
 class Panorama(Descriptor):
@@ -337,6 +338,7 @@ CALLS = {
     "patina_scene_set_settings": (c_void_p, POINTER(Settings)),
     "patina_scene_set_effects": (c_void_p, POINTER(Effects)),
     "patina_scene_set_lines": (c_void_p, POINTER(Lines)),
+    "patina_scene_extent": (c_void_p, c_void_p, c_void_p),
     "patina_scene_frame_camera": (c_void_p, c_double, c_double, c_double, POINTER(Camera)),
     "patina_frame_create": (c_void_p, POINTER(c_void_p)),
     "patina_frame_destroy": (c_void_p,),

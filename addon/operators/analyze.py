@@ -13,7 +13,7 @@ from mathutils import Matrix, Vector
 
 from .. import jobs, native, point_data
 from ..importers import NORMAL_NAME, WHOLE, Progress
-from ..sync import analysis, analyzing, attributes, linked, losses
+from ..sync import analysis, analyzing, attributes, clouds, linked, losses
 from .steps import Stepped
 
 # attribute → its type, the key of an element's values
@@ -185,6 +185,8 @@ def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], f
     points: list[Vector] = []
     others: list[Vector] = []  # of faces, where points are looked for
     boxes: dict[int, list[Vector]] = {}  # by datablock: a thousand instances share one
+    radii: dict[tuple[int, str], float] = {}
+    surface = depsgraph.scene_eval.patina.surface
     for instance in depsgraph.object_instances:
         obj = instance.object
         owner = instance.parent if instance.is_instance else obj
@@ -194,8 +196,50 @@ def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], f
         if key not in boxes:
             boxes[key] = dense_corners(obj, frame)
         solid = not chosen and obj.type == 'MESH' and len(obj.data.polygons) and not obj.patina.linked_file
-        (others if solid else points).extend(instance.matrix_world @ corner for corner in boxes[key])
+        corners = boxes[key] if solid else _widened(boxes[key], instance.matrix_world, _radius_of(obj, surface, frame, radii))
+        (others if solid else points).extend(instance.matrix_world @ corner for corner in corners)
     return points or others
+
+
+def _radius_of(obj: bpy.types.Object, surface: str, frame: int, known: dict[tuple[int, str], float]) -> tuple[float, float]:
+    """How far beyond its place a point may show, as the radius of its disc or soft ball: in the world where one is set for all, and in the
+    object's units where points have their own."""
+    patina = obj.patina
+    if not patina.soft.use and surface != 'SPLATS':
+        return 0.0, 0.0
+    one = (patina.soft.radius if patina.soft.use_radius else 0.0) if patina.soft.use else patina.radius
+    if one > 0.0:
+        return one, 0.0
+    name = clouds.radius_name(obj, surface)
+    key = (obj.data.as_pointer(), name)
+    if key not in known:
+        known[key] = _largest_radius(obj, name, frame)
+    return 0.0, known[key]
+
+
+def _largest_radius(obj: bpy.types.Object, name: str, frame: int) -> float:
+    if obj.patina.linked_file:
+        source = linked.source_of(obj, frame, [])
+        return jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud.radius_most if source else 0.0
+    if not name:
+        return 0.0
+    with attributes.readable(obj) as data:
+        values = attributes.scalars(data, len(data.vertices if obj.type == 'MESH' else data.points), name)
+    values = values[np.isfinite(values)] if values is not None else np.empty(0)
+    return max(float(values.max()), 0.0) if len(values) else 0.0
+
+
+def _widened(corners: list[Vector], matrix: Matrix, radius: tuple[float, float]) -> list[Vector]:
+    """The corners of a box in the object's space, farther apart by a radius of the world and one of the object."""
+    if not corners or not any(radius):
+        return corners
+    middle = sum(corners, Vector()) / len(corners)
+    stretch = [matrix.col[k].to_3d().length for k in range(3)]
+    most = max(stretch)
+    reach = [(radius[0] + radius[1] * most) / stretch[k] if stretch[k] > 0.0 else 0.0 for k in range(3)]
+    signs = [[1.0 if i >> k & 1 else -1.0 for k in range(3)] for i in range(8)]
+    half = [max(abs(corner[k] - middle[k]) for corner in corners) for k in range(3)]
+    return [Vector(middle[k] + sign[k] * (half[k] + reach[k]) for k in range(3)) for sign in signs]
 
 
 def dense_corners(obj: bpy.types.Object, frame: int) -> list[Vector]:

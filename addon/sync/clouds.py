@@ -316,7 +316,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
                 continue
         role = roles.role_of(instance, depsgraph.view_layer_eval)
         faces_as = 0 if not solid else triangles if patina.meshes == 'TRIANGLES' else patina.mesh_points
-        radius = _radius_name(obj, patina.surface)
+        radius = radius_name(obj, patina.surface)
         place = link.identity() if link else (obj.data.as_pointer(), radius, faces_as, *_attribute_names(obj), analysis.wanted(obj))
         place = (*place, *meshes.names_of(obj)) if solid else place
         if place not in identities:
@@ -562,7 +562,7 @@ def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
             obj.patina.colors.class_attribute, obj.patina.radius_attribute, obj.patina.hide_uncolored, soft.attribute_name(obj))
 
 
-def _radius_name(obj: bpy.types.Object, surface: str) -> str:
+def radius_name(obj: bpy.types.Object, surface: str) -> str:
     """The attribute that discs' radii are taken from. Geometry Nodes gives every point cloud radii, asked or not: they count where
     the artist wants discs."""
     if obj.patina.radius_attribute or obj.type != 'POINTCLOUD' or surface != 'SPLATS':

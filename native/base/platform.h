@@ -114,10 +114,17 @@ void pt_disk_close(struct pt_disk *disk);                 // what is mapped stay
 // Less than `size` bytes come at the file's end alone.
 int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t size, size_t *got);
 // Pages of the file; they go back by pt_pages_free. They can be read alone, so that no system sets memory aside for them, but for
-// PT_DISK_SHARED, of a spill. Another process that cuts the file short meanwhile ends this one by a fault: the price of not copying.
-// offset: a multiple of 64 KiB; size: not 0.
+// PT_DISK_SHARED, of a spill. What cannot be read any more, for another process cut the file short or its disk is gone, reads as zeros
+// (guard.h). offset: a multiple of 64 KiB; size: not 0.
 enum pt_disk_use { PT_DISK_ONCE, PT_DISK_ANYWHERE, PT_DISK_SHARED }; // read once from end to end; here and there; written too
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data);
+
+// How often pages of mapped files became zeros, in the whole process: while it stays the same nothing was lost.
+uint64_t pt_disk_losses(void);
+// Whether some of these pages of a mapping of pt_disk_map became zeros.
+int pt_pages_lost(const void *pages, size_t size);
+// A host may have put a handler of its own before the library's since: takes its place, and hands it what is not the library's. Cheap.
+void pt_disk_watch(void);
 
 // A file without a name, for what memory has no room for: it goes with its handle, and with a process that is killed. path: a file that it
 // lies on the same disk with. Read by pt_disk_read, by one thread at a time as long as somebody writes.

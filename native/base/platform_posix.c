@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // platform.h on Linux and macOS; what they do not share is in platform_linux.c and platform_macos.c.
 #include "platform.h"
+#include "guard.h"
 
 #include <dlfcn.h>
 #include <errno.h>
@@ -207,8 +208,10 @@ void pt_pages_forget(void *pages, size_t size)
 
 void pt_pages_free(void *pages, size_t size)
 {
-    if (pages)
-        munmap(pages, whole_pages(size));
+    if (!pages)
+        return;
+    pt_guard_remove(pages);
+    munmap(pages, whole_pages(size));
 }
 
 // Whole pages around what is meant.
@@ -258,17 +261,92 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
     return 0;
 }
 
+// ---- pages that cannot be read -------------------------------------------------------------------------------------------
+
+static struct sigaction former; // the host's
+
+void pt_guard_widen(uintptr_t mapping, size_t mapping_size, uintptr_t *first, uintptr_t *end)
+{
+    (void)mapping, (void)mapping_size, (void)first, (void)end; // they are whole pages
+}
+
+// mmap is a system call and nothing more on these systems, so a handler may use it.
+int pt_guard_replace(uintptr_t first, size_t size, int written)
+{
+    return mmap((void *)first, whole_pages(size), PROT_READ | (written ? PROT_WRITE : 0),
+                MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED, -1, 0) != MAP_FAILED;
+}
+
+enum { PASSED_ON = 0x50a7 }; // si_errno of a fault that we handed on; the system leaves it 0
+
+// What is not ours is the former handler's, with the signals blocked that it asked for; without one it ends the process as it would without
+// us, by the same instruction once more. So does a fault that the host hands back to us.
+static void pass_on(int signal, siginfo_t *info, void *context)
+{
+    const int comes_back = info->si_errno == PASSED_ON, simple = !(former.sa_flags & SA_SIGINFO);
+    if (comes_back || (simple && (former.sa_handler == SIG_DFL || former.sa_handler == SIG_IGN))) {
+        sigaction(signal, &(struct sigaction){.sa_handler = SIG_DFL}, NULL);
+        return;
+    }
+    sigset_t blocked = ((const ucontext_t *)context)->uc_sigmask;
+    for (int other = 1; other < NSIG; other++)
+        if (sigismember(&former.sa_mask, other) == 1)
+            sigaddset(&blocked, other);
+    if (!(former.sa_flags & SA_NODEFER))
+        sigaddset(&blocked, signal);
+    pthread_sigmask(SIG_SETMASK, &blocked, NULL);
+    info->si_errno = PASSED_ON;
+    if (simple)
+        former.sa_handler(signal);
+    else
+        former.sa_sigaction(signal, info, context);
+}
+
+static void on_fault(int signal, siginfo_t *info, void *context)
+{
+    const int error = errno;
+    if (info->si_code <= 0 || !pt_guard_fault((uintptr_t)info->si_addr)) // 0 and below: another process sent it
+        pass_on(signal, info, context);
+    errno = error;
+}
+
+void pt_disk_watch(void)
+{
+    struct sigaction now, ours = {.sa_flags = SA_SIGINFO | SA_ONSTACK};
+    if (sigaction(SIGBUS, NULL, &now) || (now.sa_flags & SA_SIGINFO && now.sa_sigaction == on_fault))
+        return;
+    former = now;
+    ours.sa_sigaction = on_fault;
+    sigfillset(&ours.sa_mask); // nothing interrupts the handler
+    sigaction(SIGBUS, &ours, NULL);
+}
+
+// The library goes: so does its handler, where it is still the first.
+__attribute__((destructor)) static void end_watch(void)
+{
+    struct sigaction now;
+    if (!sigaction(SIGBUS, NULL, &now) && now.sa_flags & SA_SIGINFO && now.sa_sigaction == on_fault)
+        sigaction(SIGBUS, &former, NULL);
+}
+
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data)
 {
-    *data = mmap(NULL, size, PROT_READ | (use == PT_DISK_SHARED ? PROT_WRITE : 0),
-                 use == PT_DISK_SHARED ? MAP_SHARED : MAP_PRIVATE, (int)disk->handle, (off_t)offset);
+    const int written = use == PT_DISK_SHARED;
+    pt_disk_watch();
+    *data = mmap(NULL, size, PROT_READ | (written ? PROT_WRITE : 0), written ? MAP_SHARED : MAP_PRIVATE, (int)disk->handle,
+                 (off_t)offset);
     if (*data == MAP_FAILED) {
         *data = NULL;
         return errno;
     }
-    if (use == PT_DISK_ONCE)
+    const int error = pt_guard_add(*data, size, written);
+    if (error) {
+        munmap(*data, whole_pages(size));
+        *data = NULL;
+    } else if (use == PT_DISK_ONCE) {
         madvise(*data, size, MADV_SEQUENTIAL);
-    return 0;
+    }
+    return error;
 }
 
 int pt_disk_spill(const char *path, struct pt_disk *disk)

@@ -3,6 +3,7 @@
 // process's code page.
 #define WIN32_LEAN_AND_MEAN
 #include "platform.h"
+#include "guard.h"
 
 #include <windows.h>
 // windows.h goes first
@@ -219,6 +220,7 @@ void pt_pages_free(void *pages, size_t size)
     (void)size;
     if (!pages)
         return;
+    pt_guard_remove(pages);
     if (VirtualQuery(pages, &info, sizeof info) && info.Type == MEM_MAPPED)
         UnmapViewOfFile(pages);
     else
@@ -332,16 +334,61 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
     return 0;
 }
 
+// ---- pages that cannot be read -------------------------------------------------------------------------------------------
+
+// A view cannot be replaced in part.
+void pt_guard_widen(uintptr_t mapping, size_t mapping_size, uintptr_t *first, uintptr_t *end)
+{
+    *first = mapping;
+    *end = mapping + mapping_size;
+}
+
+// It becomes reserved memory, whose pages are zeros when they are first read (on_fault). Threads that read it in between wait in their own
+// handler.
+int pt_guard_replace(uintptr_t first, size_t size, int written)
+{
+    (void)written;
+    return UnmapViewOfFile((void *)first) && VirtualAlloc((void *)first, size, MEM_RESERVE, PAGE_READWRITE) == (void *)first;
+}
+
+static LONG CALLBACK on_fault(EXCEPTION_POINTERS *exception)
+{
+    const EXCEPTION_RECORD *record = exception->ExceptionRecord;
+    if ((record->ExceptionCode != EXCEPTION_IN_PAGE_ERROR && record->ExceptionCode != EXCEPTION_ACCESS_VIOLATION) ||
+        record->NumberParameters < 2)
+        return EXCEPTION_CONTINUE_SEARCH;
+    const void *address = (const void *)record->ExceptionInformation[1];
+    const int writes = record->ExceptionInformation[0] == 1;
+    if (record->ExceptionCode == EXCEPTION_ACCESS_VIOLATION && writes && !pt_pages_lost(address, 1))
+        return EXCEPTION_CONTINUE_SEARCH; // a fault of the program's own
+    return pt_guard_fault((uintptr_t)address) && VirtualAlloc((void *)(uintptr_t)address, 1, MEM_COMMIT, PAGE_READWRITE)
+               ? EXCEPTION_CONTINUE_EXECUTION
+               : EXCEPTION_CONTINUE_SEARCH;
+}
+
+// The first of all handlers: what is not ours goes on to those of the host.
+void pt_disk_watch(void)
+{
+    static atomic_int watched;
+    if (!atomic_exchange(&watched, 1))
+        AddVectoredExceptionHandler(1, on_fault);
+}
+
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data)
 {
     const int written = use == PT_DISK_SHARED;
     const HANDLE section = CreateFileMappingW((HANDLE)disk->handle, NULL, written ? PAGE_READWRITE : PAGE_READONLY, 0, 0, NULL);
+    pt_disk_watch();
     *data = section
                 ? MapViewOfFile(section, written ? FILE_MAP_WRITE : FILE_MAP_READ, (DWORD)(offset >> 32), (DWORD)offset, size)
                 : NULL;
-    const int error = *data ? 0 : last_error();
+    int error = *data ? 0 : last_error();
     if (section)
         CloseHandle(section); // the view holds it
+    if (!error && (error = pt_guard_add(*data, size, written))) {
+        UnmapViewOfFile(*data);
+        *data = NULL;
+    }
     return error;
 }
 

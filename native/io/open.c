@@ -119,6 +119,15 @@ static int map_file(const char *path, struct pt_input *input, void **data)
     return code;
 }
 
+// Whether something of the file could not be read while it was: what was made of it is not what it holds.
+static int fail_lost(const struct pt_input *input)
+{
+    return pt_pages_lost(input->data, input->size)
+               ? pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be read: it was cut short meanwhile, or its disk is gone",
+                         input->name)
+               : PATINA_OK;
+}
+
 static int open_file(const char *path, bool alone, struct patina_progress *progress, struct patina_file **out)
 {
     struct pt_input input = {.progress = progress};
@@ -127,6 +136,12 @@ static int open_file(const char *path, bool alone, struct patina_progress *progr
     if (code)
         return code;
     code = read_input(&input, alone ? NULL : path, out);
+    if (fail_lost(&input)) {
+        if (!code)
+            patina_file_destroy(*out);
+        *out = NULL;
+        code = PATINA_ERROR_FILE;
+    }
     pt_pages_free(data, input.size);
     return code;
 }
@@ -188,8 +203,9 @@ static int begin_rows(struct patina_rows *rows, const char *path)
     else if (pt_text_is(&rows->input))
         rows->whole = "what the columns of a text hold is known when all its lines are";
     else
-        return pt_ply_begin(&rows->input, &rows->ply, &rows->whole);
-    return PATINA_OK;
+        code = pt_ply_begin(&rows->input, &rows->ply, &rows->whole);
+    const int lost = fail_lost(&rows->input);
+    return lost ? lost : code;
 }
 
 int patina_rows_open(const char *path, patina_progress *progress, patina_rows **out)
@@ -230,7 +246,9 @@ static int next_window(struct patina_rows *rows, uint64_t most, patina_file **ou
     if (!file)
         return pt_fail(&rows->handle, PATINA_ERROR_MEMORY, "%s: out of memory", rows->input.name);
     pt_handle_init(&file->handle);
-    const int code = pt_ply_next(rows->ply, most, file, &behind);
+    int code = pt_ply_next(rows->ply, most, file, &behind);
+    const int lost = fail_lost(&rows->input);
+    code = lost ? lost : code;
     if (code || !file->count) {
         patina_file_destroy(file);
         return code ? pt_fail_again(&rows->handle, code) : PATINA_OK;

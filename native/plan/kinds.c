@@ -2,16 +2,11 @@
 // The list of kinds, and how far what is drawn of a point reaches in each.
 #include "eye.h"
 
-#include "scene/soft.h"
+#include "scene/reach.h"
 #include "shared/balls.h"
 #include "shared/discs.h"
 
 #include <math.h>
-
-// Of footprints, where discs alone make the surface: a footprint ends about where its neighbours' begin, and filling closes what lies
-// between. Of a sphere of random points 1.2 % stays open at 1, 0.03 at 1.4, 0.01 at 1.55; at 1.6 sharp edges and slits lose half a
-// decibel. Borders, lines and foliage end where they end.
-#define SURFACE_SCALE 1.55f
 
 double pt_reach_of_none(const struct pt_to_place *what, const struct pt_chunk *chunk)
 {
@@ -22,67 +17,36 @@ double pt_reach_of_none(const struct pt_to_place *what, const struct pt_chunk *c
 
 // ---- discs ---------------------------------------------------------------------------------------------------------------
 
-// No disc is wider than this; 0: as wide as it is.
-static double radius_most(const struct pt_instance *instance, double thinned)
+double pt_reach_of_discs(const struct pt_to_place *what, const struct pt_chunk *chunk)
 {
-    return fmin(0.5 * (double)instance->style.largest_gap * thinned, (double)PT_DISC_MOST);
+    return pt_disc_reach(what->scene, what->instance, chunk, what->object->scale, 1);
 }
 
-static float surface_scale(const struct patina_scene *scene)
+double pt_usual_disc(const struct pt_to_place *what, const struct pt_chunk *chunk)
 {
-    return scene->settings.surface == PATINA_SURFACE_SPLATS ? SURFACE_SCALE : 1.0f;
+    return pt_disc_reach(what->scene, what->instance, chunk, what->object->scale, 0);
 }
-
-static double own_reach(const struct pt_to_place *what, const struct pt_chunk *chunk, double thinned, int most)
-{
-    const struct pt_instance *instance = what->instance;
-    if (instance->style.radius > 0.0f)
-        return (double)instance->style.radius * thinned;
-    if (instance->cloud->info.has_radii)
-        return (double)instance->cloud->info.radius_most * what->object->scale * thinned;
-    if (instance->cloud->shapes)
-        return (double)(surface_scale(what->scene) * (most ? chunk->reach : chunk->footprint)) * what->object->scale * thinned;
-    return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * what->object->scale *
-           thinned; // classes of spacings are 1.19 wide
-}
-
-static double disc_reach(const struct pt_to_place *what, const struct pt_chunk *chunk, int most)
-{
-    const double thinned = pt_thinning(what->scene), reach = own_reach(what, chunk, thinned, most),
-                 limit = radius_most(what->instance, thinned);
-    return limit > 0.0 ? fmin(reach, limit) : reach;
-}
-
-double pt_reach_of_discs(const struct pt_to_place *what, const struct pt_chunk *chunk) { return disc_reach(what, chunk, 1); }
-
-double pt_usual_disc(const struct pt_to_place *what, const struct pt_chunk *chunk) { return disc_reach(what, chunk, 0); }
 
 struct pt_drawn_discs pt_discs_of(const struct pt_to_place *what, double thinned)
 {
+    const double limit = fmin(0.5 * (double)what->instance->style.largest_gap * thinned, (double)PT_DISC_MOST);
     return (struct pt_drawn_discs){.radius = (float)fmin((double)what->instance->style.radius * thinned, (double)PT_DISC_MOST),
                                    .radius_scale = (float)fmin(what->object->scale * thinned, (double)PT_DISC_MOST),
-                                   .radius_most = (float)radius_most(what->instance, thinned),
-                                   .surface_scale = surface_scale(what->scene)};
+                                   .radius_most = (float)limit,
+                                   .surface_scale = pt_surface_scale(what->scene)};
 }
 
 // ---- balls ---------------------------------------------------------------------------------------------------------------
 
-// World units, of a radius of 1.
-static double ball_scale(const struct pt_to_place *what)
-{
-    const float radius = what->instance->style.soft_radius;
-    return (radius > 0.0f ? (double)radius : what->object->scale) * pt_thinning(what->scene);
-}
-
 double pt_reach_of_balls(const struct pt_to_place *what, const struct pt_chunk *chunk)
 {
-    const double radius = what->instance->style.soft_radius > 0.0f ? 1.0 : pt_soft_reach(what->instance->cloud, chunk);
-    return fmin(radius * ball_scale(what), (double)PT_SOFT_WIDEST);
+    return pt_ball_reach(what->scene, what->instance, chunk, what->object->scale);
 }
 
 struct pt_drawn_balls pt_balls_of(const struct pt_to_place *what)
 {
-    return (struct pt_drawn_balls){.radius_scale = (float)fmin(ball_scale(what), (double)PT_SOFT_WIDEST)};
+    const double scale = pt_ball_scale(what->scene, what->instance, what->object->scale);
+    return (struct pt_drawn_balls){.radius_scale = (float)fmin(scale, (double)PT_SOFT_WIDEST)};
 }
 
 // ---- the list ------------------------------------------------------------------------------------------------------------

@@ -399,13 +399,6 @@ int pt_plan_too_many(const struct patina_scene *scene, const struct pt_plan *pla
 // Gives an instance of a cloud its ids; discs: those of its points as discs (plan->ids.discs), or 0.
 void pt_set_ids(const struct pt_plan *plan, uint32_t instance, uint32_t discs, struct instance_args *args);
 
-// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2.
-static inline double pt_thinning(const struct patina_scene *scene)
-{
-    const uint32_t strata = scene->settings.strata;
-    return strata ? sqrt((double)(1u << (PT_STRATA - strata))) : 1.0;
-}
-
 // Times an instance's spacing of a class of sigma: a thickness, world units. What is left out makes nothing thicker.
 static inline float pt_sigma_scale(const struct pt_plan_instance *instance)
 {

@@ -5,6 +5,8 @@
 #include "execute.h"
 #include "page_check.h"
 
+#include "scene/page_sums.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -51,6 +53,8 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     shown->stats.mapped_read = frame->pager.read;
     shown->stats.mapped_rounds = frame->pager.rounds;
     shown->stats.mapped_returned = atomic_load(&frame->pager.returned);
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
+        shown->stats.points_lost += pt_is_first_part(scene, i) ? pt_pages_lost_points(scene->instances[i].whole) : 0;
     for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
         shown->stats.shadow_bytes += frame->shadows.words[i].size + frame->shadows.marks[i].size;
     shown->stats.shadow_bytes += frame->shadows.shown.size;
@@ -115,6 +119,7 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
     int error = pt_shadows_open(frame->device, &frame->shadows, scene, plan);
     if (!error && !(error = pt_pager_open(&frame->pager, frame->device, scene))) {
         error = pt_execute(&execution);
+        error = error ? error : pt_pager_lose(&frame->pager);
         pt_pager_close(&frame->pager);
     }
     pt_execution_close(&execution);
@@ -173,9 +178,12 @@ int pt_frame_until_sound(struct patina_frame *frame, const struct patina_scene *
                          const void *of)
 {
     int error;
-    do
+    do {
+        pt_pager_prepare(&frame->pager, scene);
         error = once(frame, scene, of);
-    while (error == PT_AGAIN);
+    } while (error == PT_AGAIN);
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
+        pt_pages_tell_lost(scene->instances[i].whole);
     if (error == PATINA_ERROR_CANCELLED)
         return pt_fail(&frame->handle, error, "%s was cancelled", what);
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;

@@ -6,6 +6,7 @@
 #include "execute.h"
 #include "merge.h"
 #include "page_check.h"
+#include "scene/page_sums.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -215,6 +216,15 @@ static int begin(struct part_job *job, struct pt_keys_head *head)
     return PATINA_OK;
 }
 
+// Nobody who merges the keys would see that some are missing: a part whose file lost pages fails.
+static int fail_lost(const struct patina_scene *scene)
+{
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
+        error = pt_pages_fail_lost(scene->instances[i].whole);
+    return error;
+}
+
 struct part_file {
     const patina_part *part;
     const char *path;
@@ -227,7 +237,7 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
     struct part_job job = {.frame = frame, .scene = scene, .part = part, .planes = {.varies = 1}};
     struct pt_keys_head head;
     frame->times.count = 0;
-    frame->pager = (struct pt_pager){.cancel = &frame->cancel};
+    frame->pager = (struct pt_pager){.cancel = &frame->cancel, .losses = frame->pager.losses, .lost = frame->pager.lost};
     int error = pt_plan_create(scene, frame->device->pool, &job.plan);
     if (error)
         return error;
@@ -239,6 +249,8 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
         error = pt_pager_open(&frame->pager, frame->device, scene);
         if (!error) {
             error = draw(&job, head.round);
+            if (error >= 0 && fail_lost(scene))
+                error = PATINA_ERROR_FILE;
             pt_pager_close(&frame->pager);
         }
         error = pt_key_writer_end(&job.writer, error);

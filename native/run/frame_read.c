@@ -93,6 +93,15 @@ static int read_plane(const struct patina_frame *frame, const char *call, uint64
     return PATINA_OK;
 }
 
+static int fail_to_number(const struct patina_frame *frame, int error, const char *call)
+{
+    return error == PATINA_ERROR_FILE
+               ? pt_fail(&frame->handle, error, "%s: a cloud's file was cut short since, or its disk is gone. Render again",
+                         call)
+           : error ? pt_fail(&frame->handle, error, "%s: a cloud in view was destroyed since", call)
+                   : PATINA_OK;
+}
+
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size)
 {
     int error = read_plane(frame, "patina_frame_read_keys", keys, size);
@@ -105,8 +114,7 @@ int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t 
                      "patina_frame_read_keys: the scene holds %llu points and triangles, whose numbers have more than 32 bits: "
                      "patina_frame_read_numbers reads them",
                      (unsigned long long)(frame->key_ids.points + frame->key_ids.triangles))
-           : error ? pt_fail(&frame->handle, error, "patina_frame_read_keys: a cloud in view was destroyed since")
-                   : PATINA_OK;
+               : fail_to_number(frame, error, "patina_frame_read_keys");
 }
 
 int pt_frame_read_numbers(const struct patina_frame *frame, uint64_t *numbers, size_t size)
@@ -115,7 +123,7 @@ int pt_frame_read_numbers(const struct patina_frame *frame, uint64_t *numbers, s
     if (error)
         return error;
     error = pt_numbering_numbers(&frame->key_ids, numbers, size / sizeof *numbers);
-    return error ? pt_fail(&frame->handle, error, "patina_frame_read_numbers: a cloud in view was destroyed since") : PATINA_OK;
+    return fail_to_number(frame, error, "patina_frame_read_numbers");
 }
 
 int pt_frame_read_ids(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "numbering.h"
 
+#include "base/platform.h"
+
 #include <stdlib.h>
 
 void pt_numbering_release(struct pt_numbering *numbering)
@@ -114,6 +116,8 @@ static int number(const struct pt_numbering *numbering, uint64_t *keys, size_t c
                 return PATINA_ERROR_EMPTY;
             last = of;
             found = numbering->clouds[of].first_point + pt_number_of(cloud, slot);
+            if (pt_disk_losses() && cloud->mapped >> PT_ARRAY_ORDER & 1u && pt_pages_lost(cloud->order + slot, 4))
+                return PATINA_ERROR_FILE; // it was cut short since the picture was drawn
         }
         keys[i] = with_z ? z << 32 | found : found;
     }

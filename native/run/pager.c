@@ -191,11 +191,40 @@ static int check_clouds(const struct pt_pager *pager)
     return found;
 }
 
+static uint32_t lost_pages(const struct patina_scene *scene)
+{
+    uint32_t lost = 0;
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
+        lost += pt_is_first_part(scene, i) ? pt_pages_lose(scene->instances[i].whole) : 0;
+    return lost;
+}
+
+void pt_pager_prepare(struct pt_pager *pager, const struct patina_scene *scene)
+{
+    if (mapped_bytes(scene))
+        pt_disk_watch();
+    pager->losses = pt_disk_losses();
+    pager->lost = lost_pages(scene);
+}
+
+int pt_pager_lose(struct pt_pager *pager)
+{
+    const uint64_t losses = pt_disk_losses(); // before they are looked for: those that come meanwhile are found next time
+    if (!pager || losses == pager->losses)
+        return PATINA_OK;
+    const uint32_t before = pager->lost;
+    pager->losses = losses;
+    pager->lost = lost_pages(pager->scene);
+    return pager->lost == before ? PATINA_OK : PT_AGAIN;
+}
+
 int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const struct patina_scene *scene)
 {
     pager->device = device;
     pager->scene = scene;
     pager->mapped = mapped_bytes(scene);
+    if (pt_pager_lose(pager)) // since the plan was begun, which has them all
+        return PT_AGAIN;
     pager->cap = cap_for(device, scene, pager->mapped, &pager->round);
     const int error = device->copies ? open_copies(pager, device) : PATINA_OK;
     if (error)
@@ -403,11 +432,9 @@ static struct chunk_view *keep_marked(const struct pt_pager *pager, const struct
     return kept;
 }
 
-int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
-                 struct pt_buffer *const *buffers, pt_run_bound *run, void *context)
+static int run_pass(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
+                    struct pt_buffer *const *buffers, pt_run_bound *run, void *context)
 {
-    if (!pager || !pager->mapped || pager->device->copies) // which looks after its ranges itself
-        return run(context, buffers);
     struct pt_chunk_list *lists = calloc(2 * (pass->ref_count + 1u), sizeof *lists);
     struct bound bound = {.lists = lists, .most = pager->round};
     struct chunk_view *marked = NULL;
@@ -448,4 +475,12 @@ int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struc
     free(bound.parts);
     free(bound.buffers);
     return error;
+}
+
+int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
+                 struct pt_buffer *const *buffers, pt_run_bound *run, void *context)
+{
+    const int alone = !pager || !pager->mapped || pager->device->copies; // a device that copies looks after its ranges itself
+    const int error = alone ? run(context, buffers) : run_pass(pager, plan, pass, buffers, run, context);
+    return error ? error : pt_pager_lose(pager);
 }

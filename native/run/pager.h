@@ -18,15 +18,22 @@ struct pt_pager {
     atomic_uint returned;
     uint64_t mapped, read;
     uint32_t rounds;
+    uint64_t losses;          // of mapped files, as far as was looked
+    uint32_t lost;            // pages of the scene's clouds that were known to be lost then
     int merged;               // parts' keys stand for those of passes that write least keys, which do not run
     const atomic_int *cancel; // NULL: nothing stops it
 };
 
 // Pages that are read for the first time are looked at: what begins, opens and runs may return PT_AGAIN (page_check.h).
+// Before anything is planned: notes which pages are lost.
+void pt_pager_prepare(struct pt_pager *pager, const struct patina_scene *scene);
 // Finds the cap: the device's, or of the memory that is free. PATINA_ERROR_MEMORY, with its message at the device, where this copies
 // clouds and they exceed a cap that was given. What was counted goes on.
 int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const struct patina_scene *scene);
 void pt_pager_close(struct pt_pager *pager);
+// After something was read of clouds: PT_AGAIN where pages that cannot be read any more were found since the last look, for they were read
+// as zeros, and the picture is to be planned anew, without them; else PATINA_OK.
+int pt_pager_lose(struct pt_pager *pager);
 // Before the plan runs: a device that copies clouds in ranges reads what its passes walk, which is looked at here.
 int pt_pager_begin(struct pt_pager *pager, const struct pt_plan *plan);
 // The same of one of its passes; part: of its share of the chunks, NULL: of all.

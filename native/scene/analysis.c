@@ -9,6 +9,7 @@
 #include "base/platform.h"
 #include "orient.h"
 #include "paged.h"
+#include "page_sums.h"
 #include "parts.h"
 #include "base/progress.h"
 #include "shared/words.h"
@@ -472,9 +473,10 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
     pt_beams_destroy(&walk.beams);
     pt_grids_destroy(&walk.grids);
     free(walk.tallies);
-    if (error)
+    const int lost = error ? PATINA_OK : pt_pages_fail_lost(cloud);
+    if (error || lost)
         pt_analysis_free(out);
-    return error ? tell(cloud, store, error) : PATINA_OK;
+    return error ? tell(cloud, store, error) : lost;
 }
 
 void pt_analysis_free(struct pt_analysis *analysis)

@@ -54,8 +54,15 @@ static int write_cloud(struct patina_cloud *cloud, const char *path, struct pt_s
     struct patina_cloud head = *cloud; // whose chunks outlive it
     struct pt_cloud_writer *writer = NULL;
     int error = pt_cloud_writer_begin(path, &head, &writer);
-    if (!error && (error = write_arrays(writer, &head, store, progress)))
-        pt_cloud_writer_drop(writer);
+    if (!error) {
+        error = write_arrays(writer, &head, store, progress);
+        error = error ? error : pt_pages_fail_lost(cloud);
+        if (!error && pt_store_lost(store))
+            error = pt_fail(NULL, PATINA_ERROR_FILE, "%s: what the analysis keeps beside it cannot be read back from the disk",
+                            path);
+        if (error)
+            pt_cloud_writer_drop(writer);
+    }
     close_cloud(cloud, store);
     if (!error)
         error = pt_cloud_writer_end(writer, &head);

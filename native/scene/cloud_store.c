@@ -308,6 +308,11 @@ static int save(const patina_cloud *cloud, const char *path, struct patina_cloud
         pt_cloud_writer_drop(writer);
         return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT, "%s: points lie too far apart to be packed", path);
     }
+    const int lost = pt_pages_fail_lost(cloud);
+    if (lost) {
+        pt_cloud_writer_drop(writer);
+        return lost;
+    }
     pt_cloud_writer_add(writer, PT_ARRAY_CHUNKS, out->chunks, sections[PT_ARRAY_CHUNKS].size);
     return pt_cloud_writer_end(writer, out);
 }
@@ -471,12 +476,13 @@ static int read_pages(const char *path, const struct pt_disk *disk, const struct
 {
     const size_t size = pt_page_sum_bytes(cloud->chunk_count);
     size_t got;
-    if (header->version == WITHOUT_PAGES || !size)
+    if (!size)
         return PATINA_OK;
-    uint32_t *sums = malloc(size);
-    if (!sums)
+    uint32_t *sums = header->version == WITHOUT_PAGES ? NULL : malloc(size);
+    if (!sums && header->version != WITHOUT_PAGES)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
-    if (pt_disk_read(disk, at, sums, size, &got) || got != size || add_piece(header->version, sums, size) != header->page_sum) {
+    if (sums && (pt_disk_read(disk, at, sums, size, &got) || got != size ||
+                 add_piece(header->version, sums, size) != header->page_sum)) {
         free(sums);
         return refuse(path, "the check sums of its pages are damaged");
     }
@@ -484,18 +490,22 @@ static int read_pages(const char *path, const struct pt_disk *disk, const struct
     return cloud->page_sums ? PATINA_OK : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
 }
 
-// All of a cloud but its points, which lie relative to their chunks. What its stations saw may be pages of the file. 0 or PATINA_ERROR_MEMORY.
-static int move_by(struct patina_cloud *cloud, const double offset[3])
+// Copies the table of stations out of the file, before it is checked: it says where words lie. 0 or PATINA_ERROR_MEMORY.
+static int own_sights(struct pt_sights *sights)
+{
+    struct pt_sight *own = sights->room ? pt_pages_alloc(sights->room * sizeof *own) : NULL;
+    if (!own)
+        return sights->room ? PATINA_ERROR_MEMORY : PATINA_OK;
+    memcpy(own, sights->each, sights->room * sizeof *own);
+    pt_pages_free(sights->each, sights->room * sizeof *own);
+    sights->each = own;
+    return PATINA_OK;
+}
+
+// All of a cloud but its points, which lie relative to their chunks.
+static void move_by(struct patina_cloud *cloud, const double offset[3])
 {
     struct pt_sights *sights = &cloud->sights;
-    if (sights->room) {
-        struct pt_sight *own = pt_pages_alloc(sights->room * sizeof *own);
-        if (!own)
-            return PATINA_ERROR_MEMORY;
-        memcpy(own, sights->each, sights->room * sizeof *own);
-        pt_pages_free(sights->each, sights->room * sizeof *own);
-        sights->each = own;
-    }
     for (int k = 0; k < 3; k++) {
         cloud->info.origin[k] += offset[k];
         cloud->info.box_min[k] += offset[k];
@@ -505,7 +515,6 @@ static int move_by(struct patina_cloud *cloud, const double offset[3])
         for (uint32_t i = 0; i < sights->count; i++)
             sights->each[i].place[k] += offset[k];
     }
-    return PATINA_OK;
 }
 
 static int open_disk(const char *path, const struct pt_disk *disk, const double *offset, struct patina_cloud *cloud)
@@ -534,13 +543,16 @@ static int open_disk(const char *path, const struct pt_disk *disk, const double 
     for (int i = PT_ARRAY_POSITIONS; i < PT_ARRAY_SIGHTS; i++)
         cloud->mapped |= (uint32_t)(sections[i].size > 0) << i;
     cloud->beside = header.beside != 0;
+    if (own_sights(&cloud->sights))
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
     code = check_cloud(path, cloud);
     code = code ? code : read_pages(path, disk, &header, pages_at(sections), cloud);
     if (code)
         return code;
-    error = offset ? move_by(cloud, offset) : PATINA_OK;
+    if (offset)
+        move_by(cloud, offset);
     pt_clusters_make(cloud);
-    error = error ? error : pt_parts_make(cloud, pt_part_slots());
+    error = pt_parts_make(cloud, pt_part_slots());
     if (!error && cloud->unordered && !cloud->part_count)
         error = pt_cloud_count_places(cloud);
     return error ? pt_fail(NULL, error, "%s: out of memory", path) : PATINA_OK;

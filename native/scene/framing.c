@@ -3,7 +3,7 @@
 #include "clip.h"
 #include "base/descriptor.h"
 #include "dense.h"
-#include "scene.h"
+#include "reach.h"
 #include "base/elementary.h"
 
 #include <math.h>
@@ -11,9 +11,10 @@
 #include <string.h>
 
 struct framing {
-    double (*corners)[3]; // of what is framed
+    double (*corners)[4]; // of what is framed, and how far beyond each something may show
     size_t count, room;
     int error;
+    double around; // of the corners that are handed in: how far beyond them something may show
     double lower[3], upper[3], center[3];
     double half_x, half_y, distance, radius;
 };
@@ -23,7 +24,7 @@ static void keep_corner(void *context, const double corner[3])
     struct framing *f = context;
     if (f->count == f->room) {
         const size_t room = f->room ? 2 * f->room : 1024;
-        double(*corners)[3] = realloc(f->corners, room * sizeof *corners);
+        double(*corners)[4] = realloc(f->corners, room * sizeof *corners);
         if (!corners) {
             f->error = PATINA_ERROR_MEMORY;
             return;
@@ -36,7 +37,7 @@ static void keep_corner(void *context, const double corner[3])
         f->upper[k] = f->count ? fmax(f->upper[k], corner[k]) : corner[k];
         f->corners[f->count][k] = corner[k];
     }
-    f->count++;
+    f->corners[f->count++][3] = f->around;
 }
 
 static void count(void *context, const double corner[3])
@@ -65,15 +66,40 @@ static int keep_instance(const patina_scene *scene, const struct pt_instance *in
                                                   : pt_dense_chunks(cloud, boxes);
     if (!f->error) {
         const struct pt_sieve sieve = pt_sieve_make(scene, instance, PT_EVERY_POINT, room);
+        const double scale = pt_stretch(instance->style.world_from_object);
+        f->around = cloud->paged ? pt_instance_reach(scene, instance) : 0.0;
         if (cloud->paged)
             keep_pages(instance, &sieve, f);
         for (uint32_t c = 0; boxes && c < cloud->chunk_count; c++)
-            if (boxes[c].lower[0] <= boxes[c].upper[0] && pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
+            if (boxes[c].lower[0] <= boxes[c].upper[0] &&
+                pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY) {
+                f->around = pt_chunk_reach(scene, instance, &cloud->chunks[c], scale);
                 pt_box_corners(boxes[c].lower, boxes[c].upper, instance->style.world_from_object, keep_corner, f);
+            }
+        f->around = 0.0;
     }
     free(boxes);
     free(room);
     return f->error;
+}
+
+// As pt_each_corner, with f->around as far beyond each instance's corners as something of it may show.
+static int each_corner(const patina_scene *scene, pt_corner_work *work, struct framing *f)
+{
+    struct pt_inverse_clip *room = malloc((scene->clip_count + 1) * sizeof *room);
+    if (!room)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
+        const struct pt_instance *instance = &scene->instances[i];
+        const struct pt_sieve sieve = pt_sieve_make(scene, instance, PT_EVERY_POINT, room);
+        f->around = pt_instance_reach(scene, instance);
+        pt_cloud_corners(instance->cloud, &sieve, instance->style.world_from_object, work, f);
+    }
+    f->around = 0.0;
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        pt_mesh_corners(pt_mesh_at(scene, i), work, f);
+    free(room);
+    return PATINA_OK;
 }
 
 static int keep_scene(const patina_scene *scene, struct framing *f)
@@ -83,18 +109,19 @@ static int keep_scene(const patina_scene *scene, struct framing *f)
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         pt_mesh_corners(pt_mesh_at(scene, i), keep_corner, f);
     if (!f->error && !f->count) // clips left the strays alone
-        f->error = pt_each_corner(scene, keep_corner, f);
+        f->error = each_corner(scene, keep_corner, f);
     return f->error;
 }
 
-// The nearest place from which the corner is in view, with 4% of air.
-static void step_back(struct framing *f, const double corner[3], const double x[3], const double y[3], const double z[3])
+// The nearest place from which a ball around the corner is in view, with 4% of air.
+static void step_back(struct framing *f, const double corner[4], const double x[3], const double y[3], const double z[3])
 {
     double p[3];
     for (int k = 0; k < 3; k++)
         p[k] = corner[k] - f->center[k];
-    f->distance = fmax(f->distance, pt_dot(p, z) + 1.04 * fabs(pt_dot(p, x)) / f->half_x);
-    f->distance = fmax(f->distance, pt_dot(p, z) + 1.04 * fabs(pt_dot(p, y)) / f->half_y);
+    const double half[2] = {f->half_x, f->half_y}, aside[2] = {fabs(pt_dot(p, x)), fabs(pt_dot(p, y))};
+    for (int k = 0; k < 2; k++) // the border's plane is as far from the corner as the ball's radius
+        f->distance = fmax(f->distance, pt_dot(p, z) + 1.04 * (aside[k] + corner[3] * sqrt(1.0 + half[k] * half[k])) / half[k]);
 }
 
 static void reach(void *context, const double corner[3])
@@ -103,7 +130,7 @@ static void reach(void *context, const double corner[3])
     double p[3];
     for (int k = 0; k < 3; k++)
         p[k] = corner[k] - f->center[k];
-    f->radius = fmax(f->radius, sqrt(pt_dot(p, p)));
+    f->radius = fmax(f->radius, sqrt(pt_dot(p, p)) + f->around);
 }
 
 int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation, double fov_degrees,
@@ -125,7 +152,7 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
         step_back(&framing, framing.corners[i], x, y, z);
     free(framing.corners);
     if (!error)
-        error = pt_each_corner(scene, reach, &framing);
+        error = each_corner(scene, reach, &framing);
     if (error)
         return pt_fail(&scene->handle, error, "framing the scene: out of memory");
     const double distance = framing.distance > 0.0 ? framing.distance : 1.0; // a single point, or nothing
@@ -144,6 +171,27 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
     }
     found.world_from_camera[15] = 1.0;
     return pt_give(&scene->handle, "patina_scene_frame_camera", &found, sizeof found, camera);
+}
+
+static void widen(void *context, const double corner[3])
+{
+    struct framing *f = context;
+    for (int k = 0; k < 3; k++) {
+        f->lower[k] = fmin(f->lower[k], corner[k] - f->around);
+        f->upper[k] = fmax(f->upper[k], corner[k] + f->around);
+    }
+}
+
+int patina_scene_extent(const patina_scene *scene, double box_min[3], double box_max[3])
+{
+    if (!scene || !box_min || !box_max)
+        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_scene_extent: bad arguments");
+    struct framing framing = {.lower = {INFINITY, INFINITY, INFINITY}, .upper = {-INFINITY, -INFINITY, -INFINITY}};
+    if (each_corner(scene, widen, &framing))
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "the scene's extent: out of memory");
+    memcpy(box_min, framing.lower, sizeof framing.lower);
+    memcpy(box_max, framing.upper, sizeof framing.upper);
+    return PATINA_OK;
 }
 
 int patina_cloud_dense_box(const patina_cloud *cloud, double box_min[3], double box_max[3])

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "page_sums.h"
 
+#include "base/platform.h"
 #include "base/progress.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -58,6 +60,7 @@ struct pt_page_sums *pt_page_sums_create(const struct patina_cloud *cloud, uint3
         *pages = (struct pt_page_sums){.sums = sums,
                                        .states = calloc((size_t)cloud->chunk_count + 1, sizeof *pages->states),
                                        .chunk_count = cloud->chunk_count,
+                                       .losses = pt_disk_losses(),
                                        .path = malloc(length)};
         if (pages->states && pages->path) {
             memcpy(pages->path, path, length);
@@ -112,23 +115,58 @@ int pt_page_is_damaged(const struct patina_cloud *cloud, uint32_t chunk)
 uint32_t pt_page_unseen(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays)
 {
     const uint32_t summed = (2u << PT_ARRAY_SHAPES) - (1u << PT_ARRAY_POSITIONS);
-    if (!cloud->page_sums)
+    if (!cloud->page_sums || !cloud->page_sums->sums)
         return 0;
     const uint32_t state = atomic_load_explicit(state_of(cloud, chunk), memory_order_relaxed);
     return state & PT_PAGE_DAMAGED ? 0 : arrays & cloud->mapped & summed & ~state;
 }
 
-static int is_good(const struct patina_cloud *cloud, uint32_t c, enum pt_array array)
+// Where an array of a chunk lies.
+static const char *bytes_of(const struct patina_cloud *cloud, uint32_t c, enum pt_array array, size_t *size)
 {
     struct patina_cloud copy = *cloud;
     struct pt_section sections[PT_ARRAYS];
-    const struct pt_chunk *chunk = &cloud->chunks[c];
-    const uint32_t page = cloud->first_chunk + c;
     const uint64_t each = pt_cloud_array_bytes(cloud, array);
     pt_cloud_sections(&copy, sections);
-    const char *data = (const char *)*sections[array].data + pt_chunk_slot(cloud, chunk) * each;
-    const uint64_t sum = pt_fingerprint(seed_of(page, array), data, (size_t)(chunk->padded * each));
+    *size = (size_t)(cloud->chunks[c].padded * each);
+    return (const char *)*sections[array].data + pt_chunk_slot(cloud, &cloud->chunks[c]) * each;
+}
+
+static int is_good(const struct patina_cloud *cloud, uint32_t c, enum pt_array array)
+{
+    const uint32_t page = cloud->first_chunk + c;
+    size_t size;
+    const char *data = bytes_of(cloud, c, array, &size);
+    const uint64_t sum = pt_fingerprint(seed_of(page, array), data, size);
     return fold(sum) == cloud->page_sums->sums[(size_t)page * PT_SUMMED + (size_t)array - 1];
+}
+
+enum { PT_LOST_BESIDE = 1 << 16 };
+
+static int is_lost(const struct patina_cloud *cloud, uint32_t c)
+{
+    int lost = 0;
+    for (int i = PT_ARRAY_POSITIONS; i <= PT_ARRAY_SHAPES && !lost; i++)
+        if (cloud->mapped >> i & 1u) {
+            size_t size;
+            const char *data = bytes_of(cloud, c, (enum pt_array)i, &size);
+            // the last page of a file that was cut ends in zeros, right before the first that is lost
+            lost = pt_pages_lost(data, size + PT_LOST_BESIDE);
+        }
+    return lost;
+}
+
+// Marks a chunk; of several threads one is the first.
+static void mark_damaged(const struct patina_cloud *cloud, uint32_t c)
+{
+    const int lost = pt_disk_losses() && is_lost(cloud, c);
+    const uint32_t before = atomic_fetch_or(state_of(cloud, c), PT_PAGE_DAMAGED | (lost ? PT_PAGE_LOST : 0));
+    if (lost && !(before & PT_PAGE_LOST))
+        atomic_fetch_add(&cloud->page_sums->lost, 1);
+    if (!(before & PT_PAGE_DAMAGED)) {
+        atomic_fetch_add(&cloud->page_sums->damaged, 1);
+        atomic_fetch_add(&cloud->page_sums->untold, (unsigned)!lost);
+    }
 }
 
 int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arrays)
@@ -144,12 +182,60 @@ int pt_page_check(const struct patina_cloud *cloud, uint32_t chunk, uint32_t arr
         }
     if (!(good | bad))
         return 0;
-    const uint32_t before = atomic_fetch_or(state_of(cloud, chunk), good | bad);
-    if (bad && !(before & PT_PAGE_DAMAGED)) {
-        atomic_fetch_add(&cloud->page_sums->damaged, 1);
-        atomic_fetch_add(&cloud->page_sums->untold, 1);
-    }
+    atomic_fetch_or(state_of(cloud, chunk), good);
+    if (bad)
+        mark_damaged(cloud, chunk);
     return bad != 0; // to each that found it, though told once
+}
+
+// ---- lost --------------------------------------------------------------------------------------------------------------
+
+uint32_t pt_pages_lose(const struct patina_cloud *cloud)
+{
+    const uint64_t losses = pt_disk_losses();
+    struct pt_page_sums *sums = cloud->page_sums;
+    if (!sums || !cloud->mapped || !losses)
+        return 0;
+    if (atomic_load(&sums->losses) != losses) {
+        struct patina_cloud copy = *cloud;
+        struct pt_section sections[PT_ARRAYS];
+        int lost = 0;
+        pt_cloud_sections(&copy, sections);
+        for (int i = PT_ARRAY_POSITIONS; i <= PT_ARRAY_SHAPES && !lost; i++)
+            lost = cloud->mapped >> i & 1u && pt_pages_lost(*sections[i].data, sections[i].size);
+        for (uint32_t c = 0; c < cloud->chunk_count && lost; c++)
+            if (!(atomic_load_explicit(state_of(cloud, c), memory_order_relaxed) & PT_PAGE_LOST) && is_lost(cloud, c))
+                mark_damaged(cloud, c);
+        atomic_store(&sums->losses, losses); // behind the marks: who does not look has them
+    }
+    return atomic_load(&sums->lost);
+}
+
+uint64_t pt_pages_lost_points(const struct patina_cloud *cloud)
+{
+    const struct pt_page_sums *sums = cloud->page_sums;
+    uint64_t points = 0;
+    for (uint32_t c = 0; sums && atomic_load(&sums->lost) && c < cloud->chunk_count; c++)
+        points += atomic_load_explicit(state_of(cloud, c), memory_order_relaxed) & PT_PAGE_LOST ? cloud->chunks[c].count : 0;
+    return points;
+}
+
+static const char cannot_be_read[] = "%s: parts of the file cannot be read any more: it was cut short, or its disk is gone.";
+
+void pt_pages_tell_lost(const struct patina_cloud *cloud)
+{
+    struct pt_page_sums *sums = cloud->page_sums;
+    char start[256];
+    if (!sums || !atomic_load(&sums->lost) || atomic_exchange(&sums->lost_told, 1))
+        return;
+    snprintf(start, sizeof start, cannot_be_read, sums->path);
+    pt_log(PT_LOG_WARNING, "%s Their points are not drawn. Open the file again once it is back", start);
+}
+
+int pt_pages_fail_lost(const struct patina_cloud *cloud)
+{
+    return pt_pages_lose(cloud) ? pt_fail(&cloud->handle, PATINA_ERROR_FILE, cannot_be_read, cloud->page_sums->path)
+                                : PATINA_OK;
 }
 
 // ---- told --------------------------------------------------------------------------------------------------------------
@@ -161,9 +247,12 @@ void pt_pages_tell(const struct patina_cloud *cloud)
     uint64_t points = 0;
     if (!sums || !atomic_exchange(&sums->untold, 0))
         return;
+    if (sums->chunk_count == cloud->chunk_count) // no part
+        pt_pages_lose(cloud);
     const struct pt_chunk *chunks = cloud->chunks - cloud->first_chunk; // of the whole, of which it may be a part
     for (uint32_t c = 0; c < sums->chunk_count; c++)
-        if (sums->states[c] & PT_PAGE_DAMAGED && !(atomic_fetch_or(&sums->states[c], PT_PAGE_TOLD) & PT_PAGE_TOLD)) {
+        if ((sums->states[c] & (PT_PAGE_DAMAGED | PT_PAGE_LOST)) == PT_PAGE_DAMAGED &&
+            !(atomic_fetch_or(&sums->states[c], PT_PAGE_TOLD) & PT_PAGE_TOLD)) {
             first = pages++ ? first : c;
             points += chunks[c].count;
         }

@@ -11,6 +11,8 @@
 
 // A page's box lies within its parent's where it reaches beyond it by less: cubes are rounded each by itself.
 #define NESTS 1e-9
+// Of a page's gap: its own points without those of the pages over it lie no farther apart. Discs and balls without radii are as wide.
+#define WIDEST_SPACING 2.0f
 
 uint32_t pt_page_share(const struct pt_page *page, uint32_t i)
 {
@@ -120,7 +122,7 @@ void pt_page_gaps(const struct patina_cloud *cloud, double *finest, double *coar
 void pt_page_box(const struct patina_cloud *cloud, uint32_t page, struct pt_chunk *box)
 {
     const patina_page *told = &cloud->paged->pages[page].told;
-    *box = (struct pt_chunk){.cone_cosine = -2.0f, .gap = (float)told->gap};
+    *box = (struct pt_chunk){.cone_cosine = -2.0f, .gap = (float)told->gap, .spacing = WIDEST_SPACING * (float)told->gap};
     memset(box->classes, 0xFF, sizeof box->classes);
     memset(box->shapes, 0xFF, sizeof box->shapes);
     for (int k = 0; k < 3; k++) {
@@ -137,6 +139,7 @@ void pt_page_around(const struct patina_cloud *cloud, uint32_t page, struct pt_c
     const patina_page *told = &cloud->paged->pages[page].told;
     memset(around, 0, sizeof *around);
     around->gap = (float)(reach ? reach->gap : told->gap);
+    around->spacing = WIDEST_SPACING * around->gap;
     pt_cluster_box(reach ? reach->box_min : told->box_min, reach ? reach->box_max : told->box_max, around);
 }
 

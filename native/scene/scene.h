@@ -7,6 +7,8 @@
 #include "mesh.h"
 #include "texture.h"
 
+#include <math.h>
+
 static inline int pt_is_zero(const float v[3]) { return v[0] == 0.0f && v[1] == 0.0f && v[2] == 0.0f; }
 
 // What an instance is of.
@@ -67,6 +69,13 @@ static inline int pt_is_first_part(const struct patina_scene *scene, uint32_t i)
 }
 // The instances that a caller's number is of: how many, from *first on; 0: there is no such number.
 uint32_t pt_scene_parts(const struct patina_scene *scene, uint32_t number, uint32_t *first);
+
+// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2.
+static inline double pt_thinning(const struct patina_scene *scene)
+{
+    const uint32_t strata = scene->settings.strata;
+    return strata ? sqrt((double)(1u << (PT_STRATA - strata))) : 1.0;
+}
 
 static inline uint32_t pt_finer(const struct patina_scene *scene) { return scene->finer > 1 ? scene->finer : 1; }
 

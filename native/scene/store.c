@@ -60,9 +60,18 @@ void pt_store_free(struct pt_store *store, void *pages, size_t size)
         pt_pages_free(pages, size);
         return;
     }
+    store->lost |= pt_pages_lost(pages, store->arrays[i].size);
     pt_pages_free(pages, store->arrays[i].size);
     pt_disk_close(&store->arrays[i].disk);
     store->arrays[i] = store->arrays[--store->count];
+}
+
+int pt_store_lost(const struct pt_store *store)
+{
+    int lost = store && store->lost;
+    for (uint32_t i = 0; store && i < store->count; i++)
+        lost |= pt_pages_lost(store->arrays[i].pages, store->arrays[i].size);
+    return lost;
 }
 
 int pt_store_is_small(const struct pt_store *store, uint64_t size)

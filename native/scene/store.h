@@ -19,6 +19,7 @@ struct pt_store {
     struct pt_look look;
     atomic_uint returned; // how often all was given back
     int error;            // of the system, where an array could not be made
+    int lost;             // an array that is gone could not be read back: ask pt_store_lost
     struct pt_stored {
         void *pages;
         size_t size;
@@ -33,6 +34,8 @@ void pt_store_close(struct pt_store *store); // with all its arrays
 // As pt_pages_alloc and pt_pages_free, by one thread at a time.
 void *pt_store_alloc(struct pt_store *store, size_t size);
 void pt_store_free(struct pt_store *store, void *pages, size_t size);
+// Whether something of an array could not be read back from the disk: what was made of it is worth nothing.
+int pt_store_lost(const struct pt_store *store); // NULL is fine
 // In memory where it is a small part of what may be taken: for what is written to here and there.
 int pt_store_is_small(const struct pt_store *store, uint64_t size);
 

@@ -37,6 +37,7 @@ static int draw_face(patina_scene *scene, patina_frame *frame, const patina_came
     if (!code)
         code = patina_frame_get_stats(frame, &face);
     stats->points = face.points;
+    stats->points_lost = face.points_lost > stats->points_lost ? face.points_lost : stats->points_lost;
     return code;
 }
 

@@ -27,6 +27,7 @@ struct job {
     patina_panorama panorama; // where the options ask for one
     patina_frame_stats stats; // of the picture
     double analysis_ms;
+    int lost; // files could not be read any more: pictures lack their points
 };
 
 static void destroy(struct job *job)
@@ -68,27 +69,14 @@ static int open_device(struct job *job)
     return code ? tool_failed("device", job->device, code) : TOOL_OK;
 }
 
-// By a box of its contents; empty ones have min > max.
-static void grow_box(struct tool_box *box, const double low[3], const double high[3])
-{
-    for (int i = 0; i < 3 && low[0] <= high[0]; i++) {
-        box->min[i] = fmin(box->min[i], low[i]);
-        box->max[i] = fmax(box->max[i], high[i]);
-    }
-}
-
 static int load_meshes(struct job *job)
 {
     for (int i = 0; i < job->options.mesh_count; i++) {
-        patina_mesh_info info = {.struct_size = sizeof info};
         int code = tool_load_mesh(job->options.meshes[i], &job->meshes[i]);
-        if (!code)
-            code = patina_mesh_get_info(job->meshes[i], &info);
         if (!code)
             code = patina_scene_add_mesh(job->scene, job->meshes[i], NULL);
         if (code)
             return tool_failed(job->options.meshes[i], NULL, code);
-        grow_box(&job->box, info.box_min, info.box_max);
     }
     return TOOL_OK;
 }
@@ -127,7 +115,6 @@ static int analyse(struct job *job, patina_cloud *cloud, const char *path, const
 static int load_clouds(struct job *job)
 {
     const struct tool_options *options = &job->options;
-    job->box = (struct tool_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     job->clouds = calloc((size_t)options->file_count + 1, sizeof *job->clouds);
     job->scans = calloc((size_t)options->file_count + 1, sizeof *job->scans);
     job->fields = calloc((size_t)options->file_count + 1, sizeof *job->fields);
@@ -170,7 +157,6 @@ static int load_clouds(struct job *job)
             return tool_failed(options->files[i], NULL, code);
         if (!info.count)
             tool_say("warning: %s holds no points", options->files[i]);
-        grow_box(&job->box, info.box_min, info.box_max);
         if (options->opacity_count)
             style.transparency = (float)(1 - options->opacity[i < options->opacity_count ? i : options->opacity_count - 1]);
         style.scans = job->scans[i].made;
@@ -202,6 +188,8 @@ static int set_scene(struct job *job)
 {
     patina_camera camera = {.struct_size = sizeof camera};
     int code = patina_scene_set_settings(job->scene, &job->options.settings);
+    if (!code)
+        code = patina_scene_extent(job->scene, job->box.min, job->box.max);
     if (!code)
         code = patina_scene_set_effects(job->scene, &job->options.effects);
     if (!code)
@@ -252,6 +240,7 @@ static int draw(struct job *job, double *ms)
     const double start = pt_milliseconds();
     if (job->options.panorama[0]) {
         const int bad = tool_draw_panorama(&job->options, &job->panorama, job->scene, job->frame, &job->pixels, &job->stats);
+        job->lost |= job->stats.points_lost > 0;
         *ms = pt_milliseconds() - start;
         return bad ? tool_failed("panorama", job->frame, bad) : TOOL_OK;
     }
@@ -267,6 +256,7 @@ static int draw(struct job *job, double *ms)
         return TOOL_OK;
     if (!code)
         code = patina_frame_get_stats(job->frame, &job->stats);
+    job->lost |= job->stats.points_lost > 0;
     if (!code && job->options.planes)
         code = patina_frame_dump_planes(job->frame, job->options.planes);
     if (!code && job->options.output) {
@@ -351,7 +341,12 @@ static int measure(struct job *job)
         const double start = pt_milliseconds();
         if (!code)
             code = patina_frame_render(job->frame, job->scene);
-        if (!code && tool_times_add(times, pt_milliseconds() - start, job->frame))
+        const double ms = pt_milliseconds() - start;
+        patina_frame_stats stats = {.struct_size = sizeof stats};
+        if (!code)
+            code = patina_frame_get_stats(job->frame, &stats);
+        job->lost |= stats.points_lost > 0;
+        if (!code && tool_times_add(times, ms, job->frame))
             code = PATINA_ERROR_MEMORY;
     }
     if (!code && job->options.json)
@@ -407,7 +402,8 @@ int tool_draw(int count, char **arguments, const struct tool_parts *parts)
     job.options.digest = result ? 0 : tool_digest(job.text);
     if (!result)
         result = run(&job);
-    tool_drain_log(job.options.verbose ? 2 : 1);
+    tool_drain_log(job.options.verbose ? 2 : 1); // it names files that were lost
+    result = !result && job.lost ? TOOL_FAILED : result;
     destroy(&job);
     return result;
 }

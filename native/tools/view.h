@@ -6,7 +6,7 @@
 #include "tool.h"
 
 struct tool_box {
-    double min[3], max[3]; // of all clouds, world units; min > max when there is no point
+    double min[3], max[3]; // of all that is drawn, as patina_scene_extent has it
 };
 
 // The camera that the options ask for, turned by `turn` degrees around the vertical axis. Returns a patina_error.

@@ -25,7 +25,7 @@ from harness import (
     stats,
     written,
 )
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 from patina import native
 from patina.sync import analysis, analyzing, clouds, linked
 
@@ -416,6 +416,33 @@ def test_frame_points():
             off = np.linalg.norm(np.array(view.view_location) - [3, 5, -7])
             check(off < 0.1 and 1.5 < view.view_distance < 6, f"a view at {view.view_location[:]}, {view.view_distance:.1f} away")
         bpy.data.objects.remove(obj)
+    clouds.CACHE.clear()
+
+
+def test_frame_soft_points():
+    """A frame holds the radius of soft points and discs, not only their places."""
+    scene = fresh_scene(160, 120)
+    for how in ("one", "attribute", "disc"):
+        obj = add_points(np.array([[3.0, 5.0, -7.0]]))
+        obj.select_set(True)
+        soft = obj.patina.soft
+        soft.use, scene.patina.surface = how != "disc", 'SPLATS' if how == "disc" else 'AUTO'
+        if how == "one":
+            soft.use_radius, soft.radius = True, 2.0
+        else:
+            obj.data.attributes.new("wide", 'FLOAT', 'POINT').data.foreach_set("value", np.array([2.0], np.float32))
+            obj.patina.radius_attribute = "wide"
+        scene.camera.location, scene.camera.rotation_euler = (0, 0, 0), (0.3, 0.2, 0.0)
+        bpy.context.view_layer.update()
+        check(bpy.ops.object.patina_frame_points() == {'FINISHED'}, "framed")
+        bpy.context.view_layer.update()
+        distance = (scene.camera.matrix_world.translation - Vector((3, 5, -7))).length
+        check(4.0 < distance < 40.0, f"{how}: the camera is {distance:.2f} away from a ball of radius 2")
+        covered = render()["Combined"][..., 3] > 0
+        rows, columns = np.nonzero(covered)
+        check(np.ptp(rows) > 40 and rows.min() > 0 and rows.max() < 119, f"{how}: rows {rows.min()} to {rows.max()} of 120")
+        bpy.data.objects.remove(obj)
+    scene.patina.surface = 'AUTO'
     clouds.CACHE.clear()
 
 

@@ -623,9 +623,13 @@ PATINA_API int patina_scene_set_settings(patina_scene *scene, const patina_setti
 PATINA_API int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects);
 // NULL: no lines, as after patina_scene_create. patina_scene_clear leaves them. On an error there are none.
 PATINA_API int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines);
+// The world-space box of all that the scene may draw, as far as clips leave it: points with the radii of their discs and soft balls, and
+// meshes. Near and far planes that hold this box cut nothing. Set the settings first: they decide what is drawn as discs. An empty scene has
+// min > max.
+PATINA_API int patina_scene_extent(const patina_scene *scene, double box_min[3], double box_max[3]);
 // A camera that frames the scene's clouds, as far as clips leave them and without strays (patina_cloud_dense_box), seen from
 // `azimuth` degrees around z (0 = from -y) and `elevation` degrees above the horizon, vertical field of view fov_degrees
-// (0 = 45.8).
+// (0 = 45.8). Near and far hold the radii of discs and soft balls too, and so does the picture.
 PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation, double fov_degrees,
                                          patina_camera *camera);
 
@@ -694,6 +698,9 @@ typedef struct patina_frame_stats {
     uint64_t mapped_read;     // by passes over points, each counted; what pixels ask of single points comes to it
     uint32_t mapped_rounds;   // of the pass over points that took most; 0 where nothing is mapped
     uint32_t mapped_returned; // how often all that was held was given back
+    uint64_t
+        points_lost; // of mapped files that cannot be read any more, cut short or on a disk that is gone: they are not drawn. A line
+                     // of the log names each such file once
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
