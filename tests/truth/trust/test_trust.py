@@ -114,8 +114,9 @@ class Written(unittest.TestCase):
         text = train.as_c(forest, calibration, 130, names, ["hall"], "2026-01-01")
         second = boost.train(values.copy(), right.copy(), one, 20)
         self.assertEqual(text, train.as_c(second, calibration, 130, names, ["hall"], "2026-01-01"))
-        for told in ("2026-01-01", "hall", *names):
-            self.assertIn(told, text)
+        self.assertEqual(train.told(text), (train.made_from(names, ["hall"]), "2026-01-01", names, ["hall"]))
+        self.assertNotEqual(train.made_from(names, ["hall"]), train.made_from(names, ["ruin"]))
+        self.assertNotEqual(train.made_from(names, ["hall"]), train.made_from(names[1:], ["hall"]))
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "trust_model.h").write_text(HEADER.format(features=5, trees=20, bins=boost.BINS))
             (Path(folder) / "model.c").write_text(text)

@@ -3,16 +3,22 @@
 
     build/out/venv/bin/python tests/truth/trust/train.py --out FILE.c [--features FOLDER --names FILE] [--trees 160]
         [--scenes trained] [--report FILE.md]
+    build/out/venv/bin/python tests/truth/trust/train.py --check FILE.c [--features FOLDER --names FILE]
 
 FOLDER has NAME.f32 of each scene: raw float32 (points, F), points in the order of the scan, as the library writes them; FILE has
 the features' names, one a line. Without a folder the features are those of features.py. Scenes that split.json holds out are
 refused. The trees are trained on all scenes; their calibration and the default threshold come from trees that were trained on
-other scenes than they are judged on. The same input gives the same bytes."""
+other scenes than they are judged on. The same input gives the same bytes.
+
+--check: whether a file was made from today's scenes, scanners and trainer, by the sum in its head (a second); with --features also
+whether training again gives its bytes (minutes)."""
 
 from __future__ import annotations
 
 import argparse
 import datetime
+import hashlib
+import re
 import sys
 from pathlib import Path
 
@@ -21,7 +27,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from truth.scans import campaigns  # noqa: E402
+from truth.scans import campaigns, exact  # noqa: E402
 from truth.scans.scanner import CAUSES  # noqa: E402
 from truth.trust import boost, features, report, samples  # noqa: E402
 
@@ -30,6 +36,26 @@ LOST = 0.01  # of the right samples of each scene: at most so many fall below th
 FAR = 0.05  # metres: what is off by more counts twice
 LEFT_OUT = ("passer", "mirrored")  # whole things that are somewhere else: no neighborhood shows that
 MOST_BYTES = 64 * 1024
+
+
+def made_from(names: list[str], scenes: list[str]) -> str:
+    """A sum over all that a model is made from, but for the features' own sources."""
+    here = Path(__file__).resolve().parent
+    digest = hashlib.sha256(exact._sources().encode())
+    for name in ("boost", "samples", "train"):
+        digest.update(exact.meaning(here / f"{name}.py").encode())
+    digest.update(repr((names, [(one.name, one.survey, one.seed) for one in map(campaigns.named, scenes)])).encode())
+    return digest.hexdigest()[:16]
+
+
+def told(text: str) -> tuple[str, str, list[str], list[str]]:
+    """What the head of a written file says: its sum, date, features and scenes."""
+    sum_, date = re.search(r"^// Sum: (\w+)", text, re.M), re.search(r"train\.py on ([\d-]+)\.", text)
+    scenes = re.search(r"^// Scenes:\n((?://   .*\n)+)", text, re.M)
+    if not (sum_ and date and scenes):
+        raise ValueError("no file that train.py wrote")
+    features_ = re.findall(r"^//   +\d+ (\S+)$", text, re.M)
+    return sum_[1], date[1], features_, re.findall(r"[\w-]+", scenes[1].replace("//", ""))
 
 
 def joined(all_: dict[str, samples.Samples], names: list[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -93,16 +119,17 @@ def as_c(forest: boost.Forest, calibration: boost.Calibration, limit: int, names
     count, wanted = len(forest.leaf), len(names)
     nodes = 2**boost.DEPTH - 1
     trees = [f"{f}, {b}" for feature, at in zip(forest.feature, forest.bin) for f, b in zip(feature, at)]
-    told = "\n".join(f"//   {k:2} {name}" for k, name in enumerate(names))
+    listed = "\n".join(f"//   {k:2} {name}" for k, name in enumerate(names))
     curve = ", ".join(f"{calibration.lowest + (k << calibration.shift)}: {calibration.table[k] / 255:.3f}"
                       for k in range(0, 256, 16))
     wrapped = "\n".join("//   " + line for line in _wrapped(", ".join(scenes), 110))
     return f"""// SPDX-License-Identifier: GPL-3.0-or-later
 // Written by tests/truth/trust/train.py on {date}. Do not edit: train again.
+// Sum: {made_from(names, scenes)} of what it was made from
 // Scenes:
 {wrapped}
 // Features:
-{told}
+{listed}
 // Calibration, score: trust:
 {chr(10).join("//   " + line for line in _wrapped(curve, 110))}
 #include "trust_model.h"
@@ -154,10 +181,18 @@ def main() -> int:
     parser.add_argument("--trees", type=int, default=TREES)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--report", type=Path, help="the tables of report.py, of scores by trees trained on other scenes")
+    parser.add_argument("--check", type=Path, metavar="FILE")
     parser.add_argument("--date", default=datetime.date.today().isoformat(), help="written into the file")
     options = parser.parse_args()
     names = options.names.read_text().split() if options.names else list(features.NAMES)
     scenes = samples.checked([one.name for one in campaigns.group(options.scenes)])
+    if options.check:
+        sum_, options.date, names, scenes = told(options.check.read_text())
+        if sum_ != made_from(names, samples.checked(scenes)):
+            print(f"{options.check} was made from other scenes, scanners or trainer. Run tests/truth/trust/train.py.", file=sys.stderr)
+            return 1
+        if not options.features:
+            return 0
     all_ = {name: samples.load(name, options.features, len(names)) for name in scenes}
     scores = crossed(all_, options.trees)
     calibration = calibrated(all_, scores)
@@ -166,6 +201,11 @@ def main() -> int:
     print(text)
     if options.report:
         options.report.write_text(text + "\n")
+    if options.check:
+        forest = boost.train(*joined(all_, scenes), options.trees)
+        same = as_c(forest, calibration, limit, names, scenes, options.date) == options.check.read_text()
+        print(f"{options.check}: training again gives {'the same' if same else 'other'} bytes")
+        return 0 if same else 1
     if options.out:
         forest = boost.train(*joined(all_, scenes), options.trees)
         if size_of(forest) > MOST_BYTES:
