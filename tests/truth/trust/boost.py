@@ -20,6 +20,10 @@ WIDEST = 16  # log odds beyond which a probability changes no more
 RATE = 0.15
 LEAST = 40.0  # of the second derivatives in a leaf, in samples times a quarter
 DAMPED = 8.0  # added to a leaf's second derivatives
+LEVELS = 16  # of trust, in four bits
+TRUST = 1.0 - ((LEVELS - 1 - np.arange(LEVELS)) / (LEVELS - 1)) ** 2
+NEVER = 1 << 30  # a score that none reaches
+LEAF = 0xFFFF  # in place of a node's feature
 STEP = 16  # units of a score between two entries of SIGMOID
 SIGMOID = np.array([round(ONE / (1.0 + math.exp(-k * STEP / UNIT)))
                     for k in range(-WIDEST * UNIT // STEP, WIDEST * UNIT // STEP + 1)], np.int64)
@@ -37,11 +41,12 @@ def thresholds(values: np.ndarray, bins: int = BINS) -> np.ndarray:
 
 
 def binned(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """(n, F) float32 → uint8: how many thresholds of its feature are at most the value; 0 for what is not a number."""
+    """(n, F) float32 → uint8: how many thresholds of its feature are at most the value; all for what is not a number, which
+    goes right in C as well."""
     out = np.empty(values.shape, np.uint8)
     for f in range(values.shape[1]):
         column = values[:, f]
-        out[:, f] = np.searchsorted(edges[f], np.where(np.isnan(column), -np.inf, column), side="right")
+        out[:, f] = np.searchsorted(edges[f], np.where(np.isnan(column), np.inf, column), side="right")
     return out
 
 
@@ -55,12 +60,35 @@ class Forest:
     bin: np.ndarray
     leaf: np.ndarray
 
-    def score(self, bins: np.ndarray) -> np.ndarray:
-        """(n, F) uint8 → int32 (n,)."""
+    def score(self, bins: np.ndarray, trees: int | None = None) -> np.ndarray:
+        """(n, F) uint8 → int32 (n,), of the first trees or all."""
         total = np.zeros(len(bins), np.int32)
-        for feature, at, leaf in zip(self.feature, self.bin, self.leaf):
+        for feature, at, leaf in list(zip(self.feature, self.bin, self.leaf))[:trees]:
             total += leaf[leaves_of(bins, feature, at)]
         return total
+
+    def nodes(self, tree: int) -> list[tuple[float, int, int]]:
+        """(most, value, feature) in preorder: features up to `most` go left, to the next node; others `value` nodes on. A leaf has
+        the feature LEAF and its score as value. Nodes that part nothing are left out."""
+        out: list[tuple[float, int, int]] = []
+
+        def add(node: int) -> None:
+            if node >= 2**DEPTH - 1:
+                out.append((0.0, int(self.leaf[tree, node - (2**DEPTH - 1)]), LEAF))
+                return
+            feature, at = int(self.feature[tree, node]), int(self.bin[tree, node])
+            edge = self.edges[feature, at - 1] if at < BINS else np.float32(np.inf)
+            if np.isinf(edge):
+                add(2 * node + 1)
+                return
+            here = len(out)
+            out.append((float(np.nextafter(edge, np.float32(-np.inf))), 0, feature))
+            add(2 * node + 1)
+            out[here] = (out[here][0], len(out) - here, feature)
+            add(2 * node + 2)
+
+        add(0)
+        return out
 
 
 def leaves_of(bins: np.ndarray, feature: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -147,26 +175,29 @@ def isotonic(score: np.ndarray, right: np.ndarray, weight: np.ndarray) -> tuple[
 
 @dataclass(eq=False)
 class Calibration:
-    """trust = table[clip((score - lowest) >> shift, 0, 255)] / 255."""
+    """least (LEVELS - 1,) int32, rising: a sample is of the level that counts how many of these its score reaches. Level l stands
+    for trust TRUST[l]. After `after` trees a score of at least `sure` is of the highest level at once."""
 
-    lowest: int
-    shift: int
-    table: np.ndarray
+    least: np.ndarray
+    after: int = 0
+    sure: int = NEVER
 
-    def trust(self, score: np.ndarray) -> np.ndarray:
-        """uint8."""
-        return self.table[np.clip((score.astype(np.int64) - self.lowest) >> self.shift, 0, 255)]
+    def level(self, score: np.ndarray, early: np.ndarray | None = None) -> np.ndarray:
+        found = np.searchsorted(self.least, score, side="right")
+        return found if early is None else np.where(early >= self.sure, LEVELS - 1, found)
+
+    def trust(self, score: np.ndarray, early: np.ndarray | None = None) -> np.ndarray:
+        return TRUST[self.level(score, early)]
 
 
 def calibrate(score: np.ndarray, right: np.ndarray, weight: np.ndarray) -> Calibration:
-    lowest, highest = int(score.min()), int(score.max())
-    shift = 0
-    while (highest - lowest) >> shift > 255:
-        shift += 1
-    cell = (score.astype(np.int64) - lowest) >> shift
-    middle, value = isotonic(cell.astype(float), right.astype(float), weight)
-    table = np.interp(np.arange(256), middle, value)
-    return Calibration(lowest, shift, np.rint(255.0 * table).clip(0, 255).astype(np.uint8))
+    """Levels meet where the share of right samples, by isotonic regression, is halfway between what they stand for."""
+    middle, value = isotonic(score, right.astype(float), weight)
+    every = np.arange(int(score.min()), int(score.max()) + 1)
+    share = np.interp(every, middle, value)
+    halfway = 0.5 * (TRUST[1:] + TRUST[:-1])
+    at = np.searchsorted(share, halfway)
+    return Calibration(np.where(at < len(every), every[np.minimum(at, len(every) - 1)], NEVER).astype(np.int32))
 
 
 def auc(score: np.ndarray, right: np.ndarray, weight: np.ndarray | None = None) -> float:

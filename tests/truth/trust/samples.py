@@ -52,29 +52,42 @@ def read(folder: Path, name: str, count: int, wanted: int) -> np.ndarray:
     return values.reshape(count, wanted)
 
 
-def load(name: str, folder: Path | None, wanted: int) -> Samples:
-    """Of a scene. folder: where its features lie; None: they are computed plainly here (minutes), and kept."""
+def load(name: str, folder: Path | None, wanted: int) -> dict[str, Samples]:
+    """Of a scene: NAME, and "NAME known" with features that used the stations, where the folder has NAME.known.f32. folder: where
+    features lie; None: they are computed plainly here (minutes), and kept."""
     scene = campaigns.named(name)
     scan = exact.Stage(scene).scan
     some, weight = chosen(scan.wrong, scene.seed)
     rest = {"right": ~scan.wrong[some], "weight": weight, "cause": scan.cause[some], "off": scan.off[some]}
     if folder:
-        return Samples(read(folder, name, len(scan), wanted)[some], **rest)
+        return {title: Samples(read(folder, file, len(scan), wanted)[some], **rest)
+                for title, file in ((name, name), (f"{name} known", f"{name}.known")) if file == name or (folder / f"{file}.f32").is_file()}
     key = hashlib.sha256(exact.meaning(Path(plain.__file__)).encode() + scan.position.tobytes()).hexdigest()[:12]
     path = exact.CACHE / f"trust-{name}-{key}.npz"
     if path.is_file():
         with np.load(path) as kept:
-            return Samples(**{one.name: kept[one.name] for one in fields(Samples)})
+            return {name: Samples(**{one.name: kept[one.name] for one in fields(Samples)})}
     made = Samples(plain.features(scan.position, some), **rest)
     path.parent.mkdir(parents=True, exist_ok=True)
     np.savez(path, **{one.name: getattr(made, one.name) for one in fields(Samples)})
-    return made
+    return {name: made}
 
 
-def groups(names: list[str]) -> list[list[str]]:
-    """GROUPS lists of scenes; a scene and its like with errors are in one, so that no group knows another's world."""
-    worlds = sorted({name.removesuffix("-errors") for name in names})
-    return [[name for name in names if worlds.index(name.removesuffix("-errors")) % GROUPS == k] for k in range(GROUPS)]
+def load_all(names: list[str], folder: Path | None, wanted: int) -> dict[str, Samples]:
+    out: dict[str, Samples] = {}
+    for name in names:
+        out |= load(name, folder, wanted)
+    return out
+
+
+def world_of(title: str) -> str:
+    return title.removesuffix(" known").removesuffix("-errors")
+
+
+def groups(titles: list[str]) -> list[list[str]]:
+    """GROUPS lists of scenes; all that shows one world is in one, so that no group knows another's world."""
+    worlds = sorted({world_of(title) for title in titles})
+    return [[title for title in titles if worlds.index(world_of(title)) % GROUPS == k] for k in range(GROUPS)]
 
 
 def checked(names: list[str]) -> list[str]:

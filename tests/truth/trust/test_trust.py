@@ -18,31 +18,24 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from truth.scans import campaigns  # noqa: E402
 from truth.trust import boost, features, report, samples, train  # noqa: E402
 
-HEADER = """#include <stdint.h>
-#define TRUST_FEATURES {features}
-#define TRUST_TREES {trees}
-#define TRUST_BINS {bins}
-"""
-JUDGE = """#include "model.c"
-void judge(const float *x, int64_t n, int32_t *score, uint8_t *trust)
+JUDGE = """#include <stdint.h>
+struct node { float most; int16_t value; uint16_t feature; };
+#include "constants.h"
+void judge(const float *x, int64_t n, int64_t width, int32_t *score, int32_t *early)
 {
-    for (int64_t i = 0; i < n; i++, x += TRUST_FEATURES) {
-        int32_t sum = 0;
-        for (int t = 0; t < TRUST_TREES; t++) {
-            int node = 0;
-            while (node < 15) {
-                int f = trust_nodes[t][node][0], bin = 0;
-                while (bin < TRUST_BINS - 1 && x[f] >= trust_thresholds[f][bin])
-                    bin++;
-                node = 2 * node + 1 + (bin >= trust_nodes[t][node][1]);
-            }
-            sum += trust_leaves[t][node - 15];
+    for (int64_t i = 0; i < n; i++, x += width) {
+        score[i] = early[i] = FIRST_SCORE;
+        for (int t = 0; t < TREES; t++) {
+            const struct node *node = nodes + roots[t];
+            while (node->feature != 0xFFFF)
+                node += x[node->feature] <= node->most ? 1 : node->value;
+            score[i] += node->value;
+            early[i] += t < SURE_AFTER ? node->value : 0;
         }
-        int64_t at = ((int64_t)sum - trust_lowest) >> trust_shift;
-        score[i] = sum;
-        trust[i] = trust_table[at < 0 ? 0 : at > 255 ? 255 : at];
     }
 }
+int32_t sure(void) { return SURE_SCORE; }
+const int32_t *least(void) { return least_scores; }
 """
 
 
@@ -64,19 +57,20 @@ class Trees(unittest.TestCase):
         self.assertGreater(boost.auc(score, true), boost.auc(p, true) - 0.02)
         calibration = boost.calibrate(score, true, np.ones(len(true)))
         fresh, again, _ = made(seed=3)
-        trust = calibration.trust(forest.score(boost.binned(fresh, forest.edges))) / 255.0
-        for low in np.arange(0.0, 1.0, 0.2):
-            some = (trust >= low) & (trust < low + 0.2)
+        level = calibration.level(forest.score(boost.binned(fresh, forest.edges)))
+        for low, high in ((0, 3), (3, 6), (6, 9), (9, 12)):
+            some = (level >= low) & (level < high)
             self.assertGreater(some.sum(), 200)
-            self.assertLess(abs(again[some].mean() - trust[some].mean()), 0.05)
-        self.assertTrue((np.diff(calibration.table.astype(int)) >= 0).all())
+            self.assertLess(abs(again[some].mean() - boost.TRUST[level[some]].mean()), 0.06)
+        self.assertTrue((np.diff(calibration.least) >= 0).all())
 
     def test_weights_of_calibration(self) -> None:
         """Wrong samples that stand for many lower the trust to their true share."""
         score, right = np.zeros(1000, np.int32), np.arange(1000) < 500
-        score[:2] = -5, 5
-        calibration = boost.calibrate(score, right, np.where(right, 99.0, 1.0))
-        self.assertAlmostEqual(calibration.trust(np.zeros(1, np.int32))[0] / 255.0, 0.99, delta=0.01)
+        for weight, trust in ((99.0, 0.99), (1.0, 0.5)):
+            calibration = boost.calibrate(score, right, np.where(right, weight, 1.0))
+            got = calibration.trust(np.zeros(1, np.int32))[0]
+            self.assertEqual(got, boost.TRUST[np.abs(boost.TRUST - trust).argmin()])
 
     def test_rising_steps(self) -> None:
         middle, value = boost.isotonic(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 0.0, 1.0]), np.ones(4))
@@ -95,7 +89,7 @@ class Trees(unittest.TestCase):
     def test_numbers_that_are_none(self) -> None:
         edges = boost.thresholds(np.arange(100, dtype=np.float32)[:, None])
         bins = boost.binned(np.array([[np.nan], [-np.inf], [np.inf], [50.0]], np.float32), edges)
-        self.assertEqual(bins[0, 0], 0)
+        self.assertEqual(bins[0, 0], boost.BINS - 1)
         self.assertEqual(bins[1, 0], 0)
         self.assertEqual(bins[2, 0], boost.BINS - 1)
         self.assertEqual(bins[3, 0], int((edges[0] <= 50.0).sum()))
@@ -108,28 +102,32 @@ class Written(unittest.TestCase):
         values[:, 4] = np.floor(values[:, 4])  # few values
         one = np.ones(len(right), int)
         forest = boost.train(values, right, one, 20)
-        score = forest.score(boost.binned(values, forest.edges))
+        bins = boost.binned(values, forest.edges)
+        score = forest.score(bins)
         calibration = boost.calibrate(score, right, np.ones(len(right)))
+        calibration.after, calibration.sure = 5, 700
         names = ["a", "b", "c", "d", "e"]
-        text = train.as_c(forest, calibration, 130, names, ["hall"], "2026-01-01")
+        text = train.as_c(forest, calibration, 13, names, ["hall"], "2026-01-01")
         second = boost.train(values.copy(), right.copy(), one, 20)
-        self.assertEqual(text, train.as_c(second, calibration, 130, names, ["hall"], "2026-01-01"))
+        self.assertEqual(text, train.as_c(second, calibration, 13, names, ["hall"], "2026-01-01"))
         self.assertEqual(train.told(text), (train.made_from(names, ["hall"]), "2026-01-01", names, ["hall"]))
         self.assertNotEqual(train.made_from(names, ["hall"]), train.made_from(names, ["ruin"]))
         self.assertNotEqual(train.made_from(names, ["hall"]), train.made_from(names[1:], ["hall"]))
         with tempfile.TemporaryDirectory() as folder:
-            (Path(folder) / "trust_model.h").write_text(HEADER.format(features=5, trees=20, bins=boost.BINS))
-            (Path(folder) / "model.c").write_text(text)
+            (Path(folder) / "constants.h").write_text(text)
             (Path(folder) / "judge.c").write_text(JUDGE)
             path = Path(folder) / "judge.so"
             subprocess.run([os.environ.get("CC", "cc"), "-std=c11", "-Wall", "-Werror", "-O2", "-fPIC", "-shared", "-o", str(path),
                             str(Path(folder) / "judge.c")], check=True)
             library = ctypes.CDLL(str(path))
-            got, trust = np.empty(len(values), np.int32), np.empty(len(values), np.uint8)
-            library.judge(values.ctypes.data_as(ctypes.c_void_p), ctypes.c_int64(len(values)),
-                          got.ctypes.data_as(ctypes.c_void_p), trust.ctypes.data_as(ctypes.c_void_p))
+            got, early = np.empty(len(values), np.int32), np.empty(len(values), np.int32)
+            library.judge(*(x.ctypes.data_as(ctypes.c_void_p) if isinstance(x, np.ndarray) else ctypes.c_int64(x)
+                            for x in (values, len(values), values.shape[1], got, early)))
+            library.least.restype = ctypes.POINTER(ctypes.c_int32)
+            self.assertEqual(library.sure(), 700)
+            self.assertEqual([library.least()[k] for k in range(boost.LEVELS - 1)], calibration.least.tolist())
         np.testing.assert_array_equal(got, score)
-        np.testing.assert_array_equal(trust, calibration.trust(score))
+        np.testing.assert_array_equal(early, forest.score(bins, 5))
         self.assertLess(train.size_of(forest), train.MOST_BYTES)
 
     def test_default_threshold(self) -> None:
@@ -143,7 +141,7 @@ class Written(unittest.TestCase):
                                          np.zeros(6000))
         calibration = train.calibrated(all_, scores)
         limit = train.threshold(all_, scores, calibration)
-        below = [[(calibration.trust(scores[name])[all_[name].right] < level).mean() for name in scores]
+        below = [[(calibration.level(scores[name])[all_[name].right] < level).mean() for name in scores]
                  for level in (limit, limit + 1)]
         self.assertLessEqual(max(below[0]), train.LOST)
         self.assertGreater(max(below[1]), train.LOST)
@@ -206,7 +204,7 @@ class Judged(unittest.TestCase):
                               np.where(right, 0.0, 0.1))
         score = np.where(right, 100, np.where(np.arange(1000) < 60, 0, 100)).astype(np.int32)  # 60 of 100 are told apart
         self.assertEqual(report.found(one, score, 0.01).sum(), 60)
-        row = report.scene_row("s", one, score, np.where(score > 50, 200, 10), 128)
+        row = report.scene_row("s", one, score, np.where(score > 50, 15, 3), 13)
         self.assertEqual(row[1:], ["10.0", "0.800", "60.0", "60.0", "60.0", "0.0", "100.0", "60.0"])
 
 

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Trains the trees that tell wrong samples from right ones, and writes them as C.
 
-    build/out/venv/bin/python tests/truth/trust/train.py --out FILE.c [--features FOLDER --names FILE] [--trees 160]
-        [--scenes trained] [--report FILE.md]
-    build/out/venv/bin/python tests/truth/trust/train.py --check FILE.c [--features FOLDER --names FILE]
+    build/out/venv/bin/python tests/truth/trust/train.py FOLDER [--trees 160] [--scenes trained] [--out FILE.h] [--report FILE.md]
+    build/out/venv/bin/python tests/truth/trust/train.py [FOLDER] --check
 
-FOLDER has NAME.f32 of each scene: raw float32 (points, F), points in the order of the scan, as the library writes them; FILE has
-the features' names, one a line. Without a folder the features are those of features.py. Scenes that split.json holds out are
-refused. The trees are trained on all scenes; their calibration and the default threshold come from trees that were trained on
-other scenes than they are judged on. The same input gives the same bytes.
+FOLDER has NAME.f32 of each scene and NAME.known.f32 of those whose stations are known, as measure.py writes them: the library's
+features, raw float32 (points, F). `plain` in its place: those of features.py. FILE.h is native/scene/trust_constants.h by default;
+native/scene/trust_model.c reads it. Scenes that split.json holds out are refused. The trees are trained on all scenes; their
+calibration and the default threshold come from trees that were trained on other scenes than they are judged on. The same input gives
+the same bytes.
 
---check: whether a file was made from today's scenes, scanners and trainer, by the sum in its head (a second); with --features also
+--check: whether the file was made from today's scenes, scanners and trainer, by the sum in its head (a second); with a folder also
 whether training again gives its bytes (minutes)."""
 
 from __future__ import annotations
@@ -31,7 +31,11 @@ from truth.scans import campaigns, exact  # noqa: E402
 from truth.scans.scanner import CAUSES  # noqa: E402
 from truth.trust import boost, features, report, samples  # noqa: E402
 
+CONSTANTS = ROOT / "native/scene/trust_constants.h"
+FEATURES = ROOT / "native/scene/trust_features.h"
 TREES = 160
+SURE_AFTER = 10  # trees, after which most points need no more
+SURE_LOST = 0.002  # of the wrong samples may count as sure then
 LOST = 0.01  # of the right samples of each scene: at most so many fall below the default threshold
 FAR = 0.05  # metres: what is off by more counts twice
 LEFT_OUT = ("passer", "mirrored")  # whole things that are somewhere else: no neighborhood shows that
@@ -50,12 +54,12 @@ def made_from(names: list[str], scenes: list[str]) -> str:
 
 def told(text: str) -> tuple[str, str, list[str], list[str]]:
     """What the head of a written file says: its sum, date, features and scenes."""
-    sum_, date = re.search(r"^// Sum: (\w+)", text, re.M), re.search(r"train\.py on ([\d-]+)\.", text)
-    scenes = re.search(r"^// Scenes:\n((?://   .*\n)+)", text, re.M)
-    if not (sum_ and date and scenes):
+    sum_, date = re.search(r"^// Sum: (\w+)", text, re.M), re.search(r"train\.py on ([\d-]+);", text)
+    lists = [re.search(rf"^// {title}:\n((?://   .*\n)+)", text, re.M) for title in ("Features", "Scenes")]
+    if not (sum_ and date and all(lists)):
         raise ValueError("no file that train.py wrote")
-    features_ = re.findall(r"^//   +\d+ (\S+)$", text, re.M)
-    return sum_[1], date[1], features_, re.findall(r"[\w-]+", scenes[1].replace("//", ""))
+    words = [re.findall(r"[\w-]+", one[1].replace("//", "")) for one in lists]
+    return sum_[1], date[1], words[0], words[1]
 
 
 def joined(all_: dict[str, samples.Samples], names: list[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -90,72 +94,62 @@ def calibrated(all_: dict[str, samples.Samples], scores: dict[str, np.ndarray]) 
 
 
 def threshold(all_: dict[str, samples.Samples], scores: dict[str, np.ndarray], calibration: boost.Calibration) -> int:
-    """The greatest trust (of 255) below which at most LOST of the right samples of each scene lie."""
-    most = 255
+    """The greatest level below which at most LOST of the right samples of each scene lie."""
+    most = boost.LEVELS - 1
     for name, score in scores.items():
         one = all_[name]
-        trust = calibration.trust(score)[one.right]
-        below = np.cumsum(np.bincount(trust, one.weight[one.right], 256)) / one.weight[one.right].sum()
+        level = calibration.level(score)[one.right]
+        below = np.cumsum(np.bincount(level, one.weight[one.right], boost.LEVELS)) / one.weight[one.right].sum()
         most = min(most, int(np.searchsorted(below, LOST, side="right")))
     return most
 
 
-def _rows(values: list[str], width: int = 120) -> str:
-    lines, line = [], "   "
-    for value in values:
-        if len(line) + len(value) + 2 > width:
-            lines.append(line)
-            line = "   "
-        line += f" {value},"
-    return "\n".join([*lines, line])
+def model(all_: dict[str, samples.Samples], trees: int) -> tuple[boost.Forest, boost.Calibration, int, dict[str, np.ndarray]]:
+    """The trees, their calibration, the default level, and the scores by trees of other scenes that both come from."""
+    scores = crossed(all_, trees)
+    calibration = calibrated(all_, scores)
+    limit = threshold(all_, scores, calibration)
+    values, right, weight = joined(all_, list(all_))
+    forest = boost.train(values, right, weight, trees)
+    early = forest.score(boost.binned(values[~right], forest.edges), SURE_AFTER)
+    calibration.after, calibration.sure = SURE_AFTER, int(np.ceil(np.quantile(early, 1.0 - SURE_LOST)))
+    return forest, calibration, limit, scores
 
 
-def number(value: float) -> str:
-    """A float32 as C writes it exactly."""
-    return "INFINITY" if np.isinf(value) else f"{float(value).hex()}f"
+def names_of_features(folder: str) -> list[str]:
+    return list(features.NAMES) if folder == "plain" else re.findall(r"X\((\w+), \"", FEATURES.read_text())
 
 
 def as_c(forest: boost.Forest, calibration: boost.Calibration, limit: int, names: list[str], scenes: list[str], date: str) -> str:
-    count, wanted = len(forest.leaf), len(names)
-    nodes = 2**boost.DEPTH - 1
-    trees = [f"{f}, {b}" for feature, at in zip(forest.feature, forest.bin) for f, b in zip(feature, at)]
-    listed = "\n".join(f"//   {k:2} {name}" for k, name in enumerate(names))
-    curve = ", ".join(f"{calibration.lowest + (k << calibration.shift)}: {calibration.table[k] / 255:.3f}"
-                      for k in range(0, 256, 16))
-    wrapped = "\n".join("//   " + line for line in _wrapped(", ".join(scenes), 110))
-    return f"""// SPDX-License-Identifier: GPL-3.0-or-later
-// Written by tests/truth/trust/train.py on {date}. Do not edit: train again.
-// Sum: {made_from(names, scenes)} of what it was made from
-// Scenes:
-{wrapped}
-// Features:
-{listed}
-// Calibration, score: trust:
-{chr(10).join("//   " + line for line in _wrapped(curve, 110))}
-#include "trust_model.h"
+    trees = [forest.nodes(k) for k in range(len(forest.leaf))]
+    nodes = [node for tree in trees for node in tree]
+    roots = np.cumsum([0] + [len(tree) for tree in trees[:-1]])
+    curve = ", ".join(f"{score} = {0.5 * (a + b):.3f}" for score, a, b in zip(calibration.least, boost.TRUST, boost.TRUST[1:]))
+    head = ["// SPDX-License-Identifier: GPL-3.0-or-later",
+            f"// Written by tests/truth/trust/train.py on {date}; trust_model.c reads it. Do not edit: train again.",
+            f"// Sum: {made_from(names, scenes)} of what it was made from"]
+    for title, words in (("Scenes", ", ".join(scenes)), ("Features", ", ".join(names)),
+                         ("Calibration, score = share that is right", curve)):
+        head += [f"// {title}:", *("//   " + line for line in _wrapped(words, 120))]
+    head.append(f"// At most {100 * LOST:g} % of the right samples of each scene are below level {limit}, trust {boost.TRUST[limit]:.3f}.")
+    return "\n".join([
+        *head, "// clang-format off",
+        f"enum {{ TREES = {len(trees)}, FIRST_SCORE = 0, SURE_AFTER = {calibration.after}, SURE_SCORE = {calibration.sure} }};",
+        f"static const int32_t least_scores[{boost.LEVELS - 1}] = {{",
+        "    " + " ".join(f"{v}," for v in calibration.least), "};",
+        "static const uint16_t roots[TREES] = {", *_rows([f"{v}," for v in roots], 16), "};",
+        "static const struct node nodes[] = {",
+        *_rows([f"{{{number(most)}, {value}, {feature}}}," for most, value, feature in nodes], 5), "};", "// clang-format on", ""])
 
-#include <math.h>
 
-// The bin of a feature is the number of its thresholds that are at most the value, 0 for NaN.
-const float trust_thresholds[TRUST_FEATURES][TRUST_BINS - 1] = {{
-{chr(10).join("    {" + _rows([number(v) for v in row]).strip().rstrip(",") + "}," for row in forest.edges)}
-}};
-// Feature and bin of {nodes} nodes a tree, breadth first. A point goes right (2 i + 2) if its bin is at least the node's.
-const uint8_t trust_nodes[TRUST_TREES][{nodes}][2] = {{
-{chr(10).join("    {" + ", ".join("{" + one + "}" for one in trees[k * nodes:(k + 1) * nodes]) + "}," for k in range(count))}
-}};
-const int16_t trust_leaves[TRUST_TREES][{nodes + 1}] = {{
-{chr(10).join("    {" + ", ".join(str(v) for v in row) + "}," for row in forest.leaf)}
-}};
-// trust = trust_table[clamp((score - trust_lowest) >> trust_shift, 0, 255)] / 255; score: the sum of a leaf of each tree.
-const int32_t trust_lowest = {calibration.lowest}, trust_shift = {calibration.shift};
-const uint8_t trust_table[256] = {{
-{_rows([str(v) for v in calibration.table])}
-}};
-// At most {100 * LOST:g} % of the right samples of any scene above have less trust than this, of 255.
-const uint8_t trust_default = {limit};
-_Static_assert(TRUST_TREES == {count} && TRUST_FEATURES == {wanted} && TRUST_BINS == {boost.BINS}, "another model");
-"""
+def _rows(items: list[str], width: int) -> list[str]:
+    return ["    " + " ".join(items[k : k + width]) for k in range(0, len(items), width)]
+
+
+def number(value: float) -> str:
+    """A float32 as C reads it exactly: nine digits do."""
+    text = f"{value:.9g}"
+    return f"{text}f" if any(c in text for c in ".e") else f"{text}.0f"
 
 
 def _wrapped(text: str, width: int) -> list[str]:
@@ -169,50 +163,45 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def size_of(forest: boost.Forest) -> int:
-    """Bytes of its constants."""
-    return 4 * forest.edges.size + forest.feature.size + forest.bin.size + 2 * forest.leaf.size + 256
+    """Bytes of its constants in C."""
+    return sum(8 * len(forest.nodes(k)) + 2 for k in range(len(forest.leaf))) + 4 * (boost.LEVELS - 1)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--features", type=Path)
-    parser.add_argument("--names", type=Path)
+    parser.add_argument("folder", nargs="?", default="", help="of features, or plain")
     parser.add_argument("--scenes", default="trained")
     parser.add_argument("--trees", type=int, default=TREES)
-    parser.add_argument("--out", type=Path)
+    parser.add_argument("--out", type=Path, default=CONSTANTS)
     parser.add_argument("--report", type=Path, help="the tables of report.py, of scores by trees trained on other scenes")
-    parser.add_argument("--check", type=Path, metavar="FILE")
+    parser.add_argument("--check", action="store_true")
     parser.add_argument("--date", default=datetime.date.today().isoformat(), help="written into the file")
     options = parser.parse_args()
-    names = options.names.read_text().split() if options.names else list(features.NAMES)
     scenes = samples.checked([one.name for one in campaigns.group(options.scenes)])
     if options.check:
-        sum_, options.date, names, scenes = told(options.check.read_text())
+        sum_, options.date, names, scenes = told(options.out.read_text())
         if sum_ != made_from(names, samples.checked(scenes)):
-            print(f"{options.check} was made from other scenes, scanners or trainer. Run tests/truth/trust/train.py.", file=sys.stderr)
+            print(f"{options.out} was made from other scenes, scanners or trainer. Run tests/truth/trust/train.py.", file=sys.stderr)
             return 1
-        if not options.features:
-            return 0
-    all_ = {name: samples.load(name, options.features, len(names)) for name in scenes}
-    scores = crossed(all_, options.trees)
-    calibration = calibrated(all_, scores)
-    limit = threshold(all_, scores, calibration)
-    text = report.tables(all_, scores, calibration, limit)
-    print(text)
-    if options.report:
-        options.report.write_text(text + "\n")
+    if not options.folder:
+        return 0 if options.check else parser.error("which folder has the features?")
+    names = names_of_features(options.folder)
+    all_ = samples.load_all(scenes, None if options.folder == "plain" else Path(options.folder), len(names))
+    forest, calibration, limit, scores = model(all_, options.trees)
+    if size_of(forest) > MOST_BYTES:
+        print(f"The model needs {size_of(forest)} bytes; {MOST_BYTES} are allowed. Train fewer trees.", file=sys.stderr)
+        return 1
+    text = as_c(forest, calibration, limit, names, scenes, options.date)
     if options.check:
-        forest = boost.train(*joined(all_, scenes), options.trees)
-        same = as_c(forest, calibration, limit, names, scenes, options.date) == options.check.read_text()
-        print(f"{options.check}: training again gives {'the same' if same else 'other'} bytes")
+        same = text == options.out.read_text()
+        print(f"{options.out}: training again gives {'the same' if same else 'other'} bytes")
         return 0 if same else 1
-    if options.out:
-        forest = boost.train(*joined(all_, scenes), options.trees)
-        if size_of(forest) > MOST_BYTES:
-            print(f"The model needs {size_of(forest)} bytes; {MOST_BYTES} are allowed. Train fewer trees.", file=sys.stderr)
-            return 1
-        options.out.write_text(as_c(forest, calibration, limit, names, scenes, options.date))
-        print(f"{options.out}: {options.trees} trees, {size_of(forest):,} bytes of constants")
+    tables = report.tables(all_, scores, calibration, limit)
+    print(tables)
+    if options.report:
+        options.report.write_text(tables + "\n")
+    options.out.write_text(text)
+    print(f"{options.out}: {options.trees} trees, {size_of(forest):,} bytes of constants, default trust {boost.TRUST[limit]:.3f}")
     return 0
 
 
