@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Virtual scans against exact views: our own settings, and VTK's points of 1 to 7 pixels, alike.
 
-    build/out/venv/bin/python tests/bench/scans.py [--scenes tuning|held|all|NAMES] [--cameras 0,1,…] [--modes MODE,…]
+    build/out/venv/bin/python tests/bench/scans.py [--scenes tuning|held|all|trained|unseen|campaigns|NAMES] [--cameras 0,1,…] [--modes MODE,…]
         [--json FILE] [--add FILE]... [--readme]
 
 MODE: default, stations (the scanners' places are known), free (and what they saw through is left out), grid (and neighbours

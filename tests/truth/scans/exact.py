@@ -32,7 +32,7 @@ ROWS = 80  # traced at once
 @dataclass(eq=False)
 class Exact:
     """A view, row 0 at the bottom. near, middle, far (h, w) float32: depth of the nearest, the central, the farthest of
-    a pixel's rays, inf for the sky; color (h, w, 3) linear, the mean over the pixel; surface (h, w) of the central
+    a pixel's rays, inf for the sky; a pane counts as nearest alone, so that neither it nor what is behind is wrong; color (h, w, 3) linear, the mean over the pixel; surface (h, w) of the central
     ray, -1 for the sky; sky: no ray meets anything; thin: a bar, wire or leaf; scanned: see SPEC; ceiling (h, w, 3) sRGB
     bytes: the colour of the nearest sample of that surface."""
 
@@ -111,10 +111,14 @@ def picture(world: World, scan: Scan, scene: Scene, seen: Camera, tree: cKDTree 
         for k, (dx, dy) in enumerate(INSIDE):
             origin, direction = seen.rays((x + dx).ravel(), (y + dy).ravel(), width, height)
             t, triangle = world.rays.trace(np.array(origin[0]), direction)
+            out.near[rows] = np.minimum(out.near[rows], t.reshape(x.shape).astype(np.float32))
+            if world.clear is not world.rays:  # a camera sees what is behind a pane
+                t, triangle = world.clear.trace(np.array(origin[0]), direction)
+                triangle = np.where(triangle >= 0, world.solid[triangle], -1)
             hit = np.flatnonzero(triangle >= 0)
             tri, place = triangle[hit], origin[0] + t[hit, None] * direction[hit]
             z = t.reshape(x.shape).astype(np.float32)
-            out.near[rows], out.far[rows] = np.minimum(out.near[rows], z), np.maximum(out.far[rows], z)
+            out.far[rows] = np.maximum(out.far[rows], z)
             if k == 0:
                 out.middle[rows] = z
                 surface = np.full(len(t), -1, np.int32)
@@ -127,7 +131,7 @@ def picture(world: World, scan: Scan, scene: Scene, seen: Camera, tree: cKDTree 
                     return (scan.surface[sample] == surface[at]) & (thin[at] | facing)
 
                 eyes = np.asarray(scene.survey.stations)
-                found = _by_grid(scan, eyes, scene.survey.step, place, fits) if len(scan.stations) \
+                found = _by_grid(scan, eyes, scene.survey.step, place, fits) if hasattr(scene.survey, "step") and len(eyes) \
                     else _by_tree(scan, tree or cKDTree(scan.true_position), place, fits)
                 flat = [np.zeros(len(t), bool), np.zeros(len(t), bool), np.zeros((len(t), 3), np.uint8)]
                 flat[0][hit], flat[1][hit] = thin, found >= 0
@@ -154,7 +158,8 @@ def meaning(path: Path) -> str:
 @functools.cache
 def _sources() -> str:
     here = Path(__file__).resolve().parent
-    paths = (*SOURCES, *(here / f"{name}.py" for name in ("solids", "places", "scanner", "exact")))
+    paths = (*SOURCES, *(here / f"{name}.py" for name in ("solids", "places", "scanner", "exact", "campaign", "worlds",
+                                                          "worlds_held")))
     return hashlib.sha256("\n".join(meaning(path) for path in paths).encode()).hexdigest()
 
 

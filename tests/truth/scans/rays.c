@@ -249,6 +249,110 @@ static void trace(const rays *r, const double *o, const double *d, double *out_t
     *out_triangle = found;
 }
 
+static inline double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static double box_gap(const box *b, const double *p)
+{
+    double sum = 0.0;
+    for (int a = 0; a < 3; a++) {
+        double d = fmax(fmax(b->lo[a] - p[a], p[a] - b->hi[a]), 0.0);
+        sum += d * d;
+    }
+    return sum;
+}
+
+// The squared distance from p of the segment that begins at v and goes along e.
+static double segment_gap(const double *v, const double *e, const double *p)
+{
+    double w[3] = {p[0] - v[0], p[1] - v[1], p[2] - v[2]}, length = dot(e, e);
+    double t = length > 0.0 ? fmin(fmax(dot(w, e) / length, 0.0), 1.0) : 0.0;
+    double d[3] = {w[0] - t * e[0], w[1] - t * e[1], w[2] - t * e[2]};
+    return dot(d, d);
+}
+
+// The squared distance from p of a triangle: of its plane where p lies above it, else of its nearest edge.
+static double triangle_gap(const double *v, const double *p)
+{
+    const double *e = v + 3, *f = v + 6;
+    double w[3] = {p[0] - v[0], p[1] - v[1], p[2] - v[2]};
+    double ee = dot(e, e), ff = dot(f, f), ef = dot(e, f), we = dot(w, e), wf = dot(w, f), det = ee * ff - ef * ef;
+    if (det > 0.0) {
+        double s = (we * ff - wf * ef) / det, t = (wf * ee - we * ef) / det;
+        if (s >= 0.0 && t >= 0.0 && s + t <= 1.0) {
+            double d[3] = {w[0] - s * e[0] - t * f[0], w[1] - s * e[1] - t * f[1], w[2] - s * e[2] - t * f[2]};
+            return dot(d, d);
+        }
+    }
+    double b[3] = {v[0] + e[0], v[1] + e[1], v[2] + e[2]}, g[3] = {f[0] - e[0], f[1] - e[1], f[2] - e[2]};
+    return fmin(fmin(segment_gap(v, e, p), segment_gap(v, f, p)), segment_gap(b, g, p));
+}
+
+static double nearest(const rays *r, const int32_t *part, const double *p, const int32_t *parts, int32_t each, double most)
+{
+    double best = most * most, gaps[2 * DEEPEST];
+    int32_t stack[2 * DEEPEST], top = 0;
+    gaps[top] = box_gap(&r->nodes[0].bounds, p);
+    stack[top++] = 0;
+    while (top > 0) {
+        top--;
+        if (!(gaps[top] < best))
+            continue;
+        const node *n = &r->nodes[stack[top]];
+        if (n->count > 0) {
+            for (int32_t i = n->first; i < n->first + n->count; i++) {
+                int32_t own = part[r->number[i]], k = 0;
+                while (k < each && parts[k] != own)
+                    k++;
+                if (k < each)
+                    best = fmin(best, triangle_gap(r->triangle + 9 * (int64_t)i, p));
+            }
+            continue;
+        }
+        double left = box_gap(&r->nodes[n->first].bounds, p), right = box_gap(&r->nodes[n->first + 1].bounds, p);
+        int32_t near = left <= right ? 0 : 1;
+        gaps[top] = near ? left : right, stack[top++] = n->first + 1 - near;
+        gaps[top] = near ? right : left, stack[top++] = n->first + near;
+    }
+    return sqrt(best);
+}
+
+typedef struct near_part {
+    const rays *r;
+    const int32_t *part, *parts;
+    const double *place;
+    int64_t begin, end;
+    const double *most;
+    double *distance;
+    int32_t each;
+} near_part;
+
+static void *near_work(void *argument)
+{
+    const near_part *p = argument;
+    for (int64_t i = p->begin; i < p->end; i++)
+        p->distance[i] = nearest(p->r, p->part, p->place + 3 * i, p->parts + p->each * i, p->each, p->most[i]);
+    return NULL;
+}
+
+int rays_nearest(const rays *r, const int32_t *part, const double *place, const int32_t *parts, int32_t each, int64_t n,
+                 const double *most, double *distance, int32_t threads)
+{
+    pthread_t ids[MOST_THREADS];
+    near_part pieces[MOST_THREADS];
+    int failed = 0;
+    threads = threads < 1 ? 1 : threads > MOST_THREADS ? MOST_THREADS : threads;
+    for (int32_t i = 0; i < threads; i++)
+        pieces[i] = (near_part){r, part, parts, place, n * i / threads, n * (i + 1) / threads, most, distance, each};
+    int32_t started = 0;
+    for (; started < threads - 1 && !failed; started += !failed)
+        failed = pthread_create(&ids[started], NULL, near_work, &pieces[started]) != 0;
+    if (!failed)
+        near_work(&pieces[threads - 1]);
+    for (int32_t i = 0; i < started; i++)
+        pthread_join(ids[i], NULL);
+    return failed ? -1 : 0;
+}
+
 typedef struct part {
     const rays *r;
     const double *origin, *direction;

@@ -25,6 +25,11 @@ RAYS_API void rays_destroy(rays *r);
 // where nothing is met. Returns 0, or -1 when no thread could be started.
 RAYS_API int rays_trace(const rays *r, const double *origin, int32_t shared_origin, const double *direction, int64_t n,
                         double *t, int32_t *triangle, int32_t threads);
+// Writes the distance of each of n places from the nearest triangle of its own parts, or its `most` if none is nearer: a small
+// one makes the search short. part: of each triangle as given to rays_create; parts: `each` numbers a place, negative for none.
+// Returns 0, or -1 when no thread could be started.
+RAYS_API int rays_nearest(const rays *r, const int32_t *part, const double *place, const int32_t *parts, int32_t each,
+                          int64_t n, const double *most, double *distance, int32_t threads);
 // Linear colours at places on surfaces with unit normals.
 RAYS_API void rays_albedo(const material *materials, const int32_t *which, const double *place, const double *normal, int64_t n,
                           float *rgb);

@@ -39,6 +39,7 @@ def _load() -> ctypes.CDLL:
     lib.rays_create.restype, lib.rays_create.argtypes = c_void_p, (c_void_p, c_int64)
     lib.rays_destroy.restype, lib.rays_destroy.argtypes = None, (c_void_p,)
     lib.rays_trace.argtypes = (c_void_p, c_void_p, c_int32, c_void_p, c_int64, POINTER(c_double), POINTER(c_int32), c_int32)
+    lib.rays_nearest.argtypes = (c_void_p, c_void_p, c_void_p, c_void_p, c_int32, c_int64, c_void_p, POINTER(c_double), c_int32)
     lib.rays_albedo.restype = None
     lib.rays_albedo.argtypes = (POINTER(Material), c_void_p, c_void_p, c_void_p, c_int64, POINTER(c_float))
     return lib
@@ -82,6 +83,19 @@ class Rays:
         if code:
             raise RuntimeError("no thread for the rays")
         return t, triangle
+
+    def nearest(self, place: np.ndarray, part: np.ndarray, parts: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """place (n, 3); part of each triangle; parts (n, k) of each place, -1 for none → distance (n,) from the nearest
+        triangle of these parts, or `most` (n,) where none is nearer; a small one makes the search short."""
+        most = np.ascontiguousarray(most, np.float64)
+        place, part = np.ascontiguousarray(place, np.float64), np.ascontiguousarray(part, np.int32)
+        parts = np.ascontiguousarray(parts, np.int32)
+        distance = np.empty(len(place))
+        code = library().rays_nearest(self._handle, part.ctypes.data, place.ctypes.data, parts.ctypes.data, parts.shape[1],
+                                      len(place), most.ctypes.data, distance.ctypes.data_as(POINTER(c_double)), THREADS)
+        if code:
+            raise RuntimeError("no thread for the distances")
+        return distance
 
     def albedo(self, place: np.ndarray, triangle: np.ndarray) -> np.ndarray:
         """Linear colours (n, 3) float32 at places on triangles."""

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws the virtual scans with the library and holds the pictures against the exact ones.
 
-    build/out/venv/bin/python tests/truth/scans/run.py [--scenes a,b | tuning | held | all] [--cameras 0,3]
+    build/out/venv/bin/python tests/truth/scans/run.py [--scenes a,b | tuning | held | all | trained | unseen | campaigns]
+        [--cameras 0,3]
         [--analysis off|on|stations|free|grid] [--set surface=1]... [--style radius=0.02]... [--effect ...]... [--hook FILE.py]
         [--pictures FOLDER] [--json FILE]
 
@@ -28,8 +29,9 @@ ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "addon")]
 
 from truth.scans import metrics  # noqa: E402
+from truth.scans.campaigns import group, named  # noqa: E402
 from truth.scans.exact import Exact, Stage, camera  # noqa: E402
-from truth.scans.scenes import HEIGHT, SCENES, SKY, STEP, WIDTH, Scene, named  # noqa: E402
+from truth.scans.scenes import HEIGHT, SKY, STEP, WIDTH, Scene  # noqa: E402
 from truth.scans.solids import linear  # noqa: E402
 
 COLUMNS = ("false", "lost", "sky", "psnr", "ceiling", "ssim", "thin", "outline", "flicker", "invented", "hiding", "ms", "work")
@@ -57,7 +59,8 @@ class Drawer:
         made = make(self.native, scan, stage.scene) if make else \
             self.native.Cloud(np.ascontiguousarray(scan.position, np.float32), None, np.ascontiguousarray(scan.color))
         if self.analysis != "off" and hasattr(made, "analyse") and not make:
-            known = self.analysis in ("stations", "free", "grid") and len(scan.stations) > 0
+            # samples of a walk have no station
+            known = self.analysis in ("stations", "free", "grid") and len(scan.stations) > int(scan.scan.max())
             by_grid = known and self.analysis == "grid"
             made.analyse(stations=scan.stations if known else None,
                          station=scan.scan.astype(np.uint8)[:, None] if known else None,
@@ -159,9 +162,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def scenes_of(words: str) -> list[Scene]:
-    groups = {"tuning": [one for one in SCENES if not one.held_out], "held": [one for one in SCENES if one.held_out],
-              "all": list(SCENES)}
-    return groups[words] if words in groups else [named(one) for one in words.split(",")]
+    return group(words)
 
 
 def measure(drawer: Any, scenes: list[Scene], cameras: list[int], pictures: Path | None = None, motion: bool = True,
@@ -192,7 +193,8 @@ def measure(drawer: Any, scenes: list[Scene], cameras: list[int], pictures: Path
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", default="tuning", help="names with commas, or tuning (default), held, all")
+    parser.add_argument("--scenes", default="tuning", help="names with commas, or tuning (default), held, all: the frozen scenes; "
+                        "trained, unseen, campaigns: those with the errors of real scanners")
     parser.add_argument("--cameras", default="0,1,2,3,4,5,6,7")
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=JSON", help="of patina_settings")
     parser.add_argument("--style", action="append", default=[], metavar="FIELD=JSON", help="of patina_cloud_style")

@@ -14,6 +14,14 @@ import numpy as np
 from .scenes import Survey
 from .solids import World
 
+# What made a sample: its surface and nothing else; a beam on several surfaces; its surface, but with noise beyond the limit of
+# a wrong sample; something seen in a mirror; a pane, or what is behind one; nothing at all; a drop; someone who walked by.
+CAUSES = ("surface", "mixed", "noise", "mirrored", "glass", "stray", "rain", "passer")
+SURFACE, MIXED, NOISE, MIRRORED, PANE, STRAY, RAIN, PASSER = range(len(CAUSES))
+LEAST_OFF = 0.02  # metres: a sample that is nearer to a surface of its beam is never wrong
+SIGMAS = 3.0
+NOWHERE = 1e3  # metres: how far a sample is off whose beam met nothing
+
 AROUND = 5  # rays of a beam beside its middle
 PULSE = 1.5  # metres; surfaces further apart than this are told apart, as a rule
 LOWEST = -62.0  # degrees; a station does not see the ground beneath its tripod
@@ -27,7 +35,12 @@ class Scan:
     """position float64 (n, 3) as told; color uint8 sRGB (n, 3); scan, row, column int32 (n,); stations (k, 3). What only the
     truth knows: true_position (n, 3), surface (n,) of the nearest part in the beam, -1 for a place between two; interval
     (n,): metres between samples across the beam, cosine (n,) at the surface, normal float32 (n, 3) toward the scanner, beam
-    (n, 3) float32: the way of the light. shape: rows and columns of each scan's grid."""
+    (n, 3) float32: the way of the light. shape: rows and columns of each scan's grid.
+
+    wrong (n,) bool: off > max(LEAST_OFF, SIGMAS sigma). off (n,) float32: metres from the nearest surface (part) of its beam;
+    sigma (n,) float32: the scanner's stated noise there; cause (n,) uint8: of CAUSES. These three are meant in the scan's own
+    frame. shift (n,) float32: metres by which registration or drift moved the sample, which is not in `off`: a scan that is
+    moved as a whole has no wrong samples for that."""
 
     position: np.ndarray
     color: np.ndarray
@@ -42,6 +55,11 @@ class Scan:
     normal: np.ndarray
     beam: np.ndarray
     shape: np.ndarray
+    off: np.ndarray
+    wrong: np.ndarray
+    sigma: np.ndarray
+    cause: np.ndarray
+    shift: np.ndarray
 
     def __len__(self) -> int:
         return len(self.position)
@@ -55,7 +73,8 @@ def srgb_bytes(linear: np.ndarray) -> np.ndarray:
 def beams(world: World, origin: np.ndarray, direction: np.ndarray, survey: Survey, random: np.random.Generator,
           aperture: float = 0.006) -> dict[str, np.ndarray]:
     """Unit directions (n, 3), origin (3,) or (n, 3) → index of the beams that return (k,), range (k,) without noise, colour,
-    surface, true_position, cosine, each (k, ...)."""
+    surface, true_position, cosine; parts and distances that all its rays met (k, 6), -1
+    and inf for none, each (k, ...)."""
     found: list[dict[str, np.ndarray]] = []
     for begin in range(0, len(direction), CHUNK):
         way = direction[begin : begin + CHUNK]
@@ -102,23 +121,43 @@ def beams(world: World, origin: np.ndarray, direction: np.ndarray, survey: Surve
         keep = np.flatnonzero(~lost)
         found.append({"index": keep + begin, "range": range_[keep], "color": color[keep], "true_position": truth[keep],
                       "surface": np.where(between[keep], -1, world.surface[tri[keep]]), "cosine": cosine[keep],
-                      "normal": normal[keep].astype(np.float32), "beam": way[keep].astype(np.float32)})
+                      "normal": normal[keep].astype(np.float32), "beam": way[keep].astype(np.float32),
+                      "parts": np.where(met, world.surface[triangle], -1).T[keep], "hits": t.T[keep]})
     return {name: np.concatenate([one[name] for one in found]) for name in found[0]}
 
 
-def _small_turn(random: np.random.Generator, angle: float) -> np.ndarray:
+def judged(world: World, origin: np.ndarray, way: np.ndarray, noisy: np.ndarray, clean: np.ndarray, hits: np.ndarray,
+           parts: np.ndarray, sigma: np.ndarray) -> dict[str, np.ndarray]:
+    """The truth of samples on beams from origins (3,) or (n, 3) along unit directions (n, 3), in the scan's own frame. noisy,
+    clean (n,): ranges; hits (n, k): where rays of the beam met surfaces, inf for none; parts (n, k'): these; sigma (n,) → off,
+    wrong, sigma, and the causes SURFACE, MIXED and NOISE."""
+    def off(range_: np.ndarray) -> np.ndarray:
+        # A hit bounds the search, with what its ray is away from the beam's middle.
+        bound = np.minimum(np.abs(hits - range_[:, None]).min(axis=1) + 0.02 + 0.004 * range_, NOWHERE)
+        found = world.off(origin + range_[:, None] * way, parts, bound)
+        return np.where(np.isfinite(hits).any(axis=1), found, NOWHERE)
+
+    away = off(noisy).astype(np.float32)
+    wrong = away > np.maximum(LEAST_OFF, SIGMAS * sigma)
+    mixed = off(clean) > 0.5 * LEAST_OFF
+    return {"off": away, "wrong": wrong, "sigma": np.asarray(sigma, np.float32),
+            "cause": np.where(mixed, MIXED, np.where(wrong, NOISE, SURFACE)).astype(np.uint8)}
+
+
+def small_turn(random: np.random.Generator, angle: float) -> np.ndarray:
     x, y, z = random.normal(scale=angle, size=3)
     q, _ = np.linalg.qr(np.array([[1.0, -z, y], [z, 1.0, -x], [-y, x, 1.0]]))
     return q * np.sign(np.diag(q))
 
 
-def _finish(parts: list[dict[str, np.ndarray]], stations: np.ndarray, shape: np.ndarray, random: np.random.Generator) -> Scan:
+def finish(parts: list[dict[str, np.ndarray]], stations: np.ndarray, shape: np.ndarray, random: np.random.Generator) -> Scan:
     whole = {name: np.concatenate([one[name] for one in parts]) for name in parts[0]}
     color = srgb_bytes(whole["color"]).astype(np.int16) + np.rint(
         random.normal(scale=1.5, size=whole["color"].shape)).astype(np.int16)
     return Scan(whole["position"], np.clip(color, 0, 255).astype(np.uint8), whole["scan"].astype(np.int32),
                 whole["row"].astype(np.int32), whole["column"].astype(np.int32), stations, whole["true_position"],
-                whole["surface"].astype(np.int32), whole["interval"], whole["cosine"], whole["normal"], whole["beam"], shape)
+                whole["surface"].astype(np.int32), whole["interval"], whole["cosine"], whole["normal"], whole["beam"], shape,
+                whole["off"], whole["wrong"], whole["sigma"], whole["cause"], whole["shift"].astype(np.float32))
 
 
 def stations(world: World, survey: Survey, random: np.random.Generator) -> Scan:
@@ -135,10 +174,13 @@ def stations(world: World, survey: Survey, random: np.random.Generator) -> Scan:
         index = got.pop("index")
         noisy = got["range"] + random.normal(scale=survey.noise, size=len(index))
         shift = random.normal(scale=survey.registration / np.sqrt(3.0), size=3)
-        place = eye + (noisy[:, None] * way[index]) @ _small_turn(random, 2e-4).T + shift
-        parts.append({**got, "position": place, "scan": np.full(len(index), number), "row": index // columns,
+        own = eye + noisy[:, None] * way[index]
+        place = eye + (noisy[:, None] * way[index]) @ small_turn(random, 2e-4).T + shift
+        truth = judged(world, eye, way[index], noisy, got["range"], got.pop("hits"), got.pop("parts"),
+                       np.full(len(index), survey.noise))
+        parts.append({**got, **truth, "shift": np.linalg.norm(place - own, axis=1), "position": place, "scan": np.full(len(index), number), "row": index // columns,
                       "column": index % columns, "interval": got["range"] * np.radians(survey.step)})
-    return _finish(parts, np.array(survey.stations), np.array([[rows, columns]] * len(survey.stations)), random)
+    return finish(parts, np.array(survey.stations), np.array([[rows, columns]] * len(survey.stations)), random)
 
 
 def airborne(world: World, survey: Survey, random: np.random.Generator) -> Scan:
@@ -160,9 +202,12 @@ def airborne(world: World, survey: Survey, random: np.random.Generator) -> Scan:
         index = got.pop("index")
         noisy = got["range"] + random.normal(scale=survey.noise, size=len(index))
         shift = random.normal(scale=survey.registration / np.sqrt(3.0), size=3)
-        parts.append({**got, "position": eye[index] + noisy[:, None] * way[index] + shift, "scan": np.full(len(index), number),
+        truth = judged(world, eye[index], way[index], noisy, got["range"], got.pop("hits"), got.pop("parts"),
+                       np.full(len(index), survey.noise))
+        parts.append({**got, **truth, "shift": np.full(len(index), np.linalg.norm(shift)),
+                      "position": eye[index] + noisy[:, None] * way[index] + shift, "scan": np.full(len(index), number),
                       "row": index // columns, "column": index % columns, "interval": np.full(len(index), step)})
-    return _finish(parts, np.zeros((0, 3)), np.zeros((0, 2), int), random)
+    return finish(parts, np.zeros((0, 3)), np.zeros((0, 2), int), random)
 
 
 def photos(world: World, survey: Survey, random: np.random.Generator) -> Scan:
@@ -195,15 +240,23 @@ def photos(world: World, survey: Survey, random: np.random.Generator) -> Scan:
         stray = random.random(len(index)) < 0.004
         depth[stray] += random.normal(scale=0.06, size=int(stray.sum()))
         shift = random.normal(scale=0.001, size=3)
+        truth = judged(world, eye, way[index], got["range"] + depth, got["range"], got.pop("hits"), got.pop("parts"),
+                       got["range"] * survey.noise)
+        truth["cause"][stray] = STRAY
         place = eye + (got["range"] + depth)[:, None] * way[index] + shift
         alone = got["range"] * 2.0 * np.tan(np.radians(38.0)) * np.sqrt(1.0 / (0.65 * each))
-        parts.append({**got, "position": place, "scan": np.full(len(index), number), "row": np.zeros(len(index)),
+        parts.append({**got, **truth, "shift": np.full(len(index), np.linalg.norm(shift)), "position": place,
+                      "scan": np.full(len(index), number), "row": np.zeros(len(index)),
                       "column": np.zeros(len(index)), "interval": alone})
-    return _finish(parts, np.zeros((0, 3)), np.zeros((0, 2), int), random)
+    return finish(parts, np.zeros((0, 3)), np.zeros((0, 2), int), random)
 
 
 PATTERNS = {"stations": stations, "airborne": airborne, "photos": photos}
 
 
 def scan(world: World, survey: Survey, seed: int = 1) -> Scan:
+    """survey: a Survey, or a Campaign with the errors of campaign.py."""
+    if not isinstance(survey, Survey):
+        from .campaign import scan as scan_campaign
+        return scan_campaign(world, survey, np.random.default_rng(seed))
     return PATTERNS[survey.pattern](world, survey, np.random.default_rng(seed))

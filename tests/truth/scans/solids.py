@@ -12,6 +12,7 @@ import numpy as np
 from .rays import PATTERNS, Material, Rays
 
 Place = Sequence[float]
+GLASS, MIRROR = 1, 2  # of a part: a pane that one sees through; a polished or wet surface
 
 
 def linear(srgb: np.ndarray) -> np.ndarray:
@@ -30,13 +31,22 @@ def turned(degrees: float, place: Place = (0.0, 0.0, 0.0)) -> np.ndarray:
 
 @dataclass(eq=False)
 class World:
-    """What is traced. corners (n, 3, 3), material (n,), surface (n,): number of the part; thin (parts,) bool."""
+    """What is traced. corners (n, 3, 3), material (n,), surface (n,): number of the part; thin (parts,) bool; gloss (parts,)
+    uint8: 0 matt, GLASS or MIRROR; clear: rays against all but glass, or `rays` where there is no glass."""
 
     corners: np.ndarray
     material: np.ndarray
     surface: np.ndarray
     thin: np.ndarray
     rays: Rays
+    gloss: np.ndarray
+    clear: Rays
+    solid: np.ndarray  # the triangles of `clear`
+
+    def off(self, place: np.ndarray, parts: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """The distance (n,) of each place (n, 3) from the nearest of its own parts (n, k), at most `most` (n,); -1 stands for
+        no part."""
+        return self.rays.nearest(place, self.surface, parts, most)
 
     @property
     def normal(self) -> np.ndarray:
@@ -52,11 +62,13 @@ class Solids:
         self._material: list[np.ndarray] = []
         self._surface: list[np.ndarray] = []
         self._thin: list[bool] = []
+        self._gloss: list[int] = []
         self._materials: list[Material] = []
         self.matrix = np.eye(4)
 
-    def part(self, thin: bool = False) -> None:
+    def part(self, thin: bool = False, gloss: int = 0) -> None:
         self._thin.append(thin)
+        self._gloss.append(gloss)
 
     def material(self, pattern: str, first: Place, second: Place = (0.6, 0.58, 0.55), length: float = 0.3,
                  grain: float = 0.25) -> int:
@@ -229,6 +241,9 @@ class Solids:
             beam(base, base + (height + 0.05) * up, 1.8 * flat, 1.8 * side)
 
     def world(self) -> World:
-        corners, material = np.concatenate(self._corners), np.concatenate(self._material)
-        return World(corners, material, np.concatenate(self._surface), np.array(self._thin),
-                     Rays(corners, material, self._materials))
+        corners, material, surface = (np.concatenate(one) for one in (self._corners, self._material, self._surface))
+        gloss = np.array(self._gloss, np.uint8)
+        rays = Rays(corners, material, self._materials)
+        solid = np.flatnonzero(gloss[surface] != GLASS)
+        clear = rays if len(solid) == len(corners) else Rays(corners[solid], material[solid], self._materials)
+        return World(corners, material, surface, np.array(self._thin), rays, gloss, clear, solid)
