@@ -44,7 +44,8 @@ class Matrix(unittest.TestCase):
         self.assertEqual([run[name] for name in matrix.SUMS], [3, 1, 2])
 
     def test_a_crash_is_a_failure(self):
-        self.assertEqual(self.of(setting() + "ok a\n")["failed"], 1)
+        run = self.of(setting() + "ok a\nFAIL b: why\n")
+        self.assertEqual([run[name] for name in matrix.SUMS], [1, 2, 0])
 
     def test_named_tests_and_other_logs_are_left_out(self):
         self.assertIsNone(self.of(setting(whole=False) + "3 passed, 0 failed, 0 skipped\n"))
