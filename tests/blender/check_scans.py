@@ -286,7 +286,7 @@ def test_ptx_is_range_images():
         bpy.context.view_layer.update()
         check_close([item.matrix_world.translation for item in empties], [(0, 0, 0), (1, -1, 0)], 1e-5, "stations")
         if not link:
-            scan = np.zeros(len(obj.data.vertices), np.int32)
+            scan = np.zeros(point_data.count_of(obj.data), np.int32)
             obj.data.attributes["scan"].data.foreach_get("value", scan)
             check(np.bincount(scan).tolist() == [288, 220], f"{np.bincount(scan)}")
         bpy.context.view_layer.objects.active = obj
