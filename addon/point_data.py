@@ -16,11 +16,11 @@ RESIZES = hasattr(bpy.types.PointCloud, "resize")
 RADIUS, POSITION = "radius", "position"
 SELECTION = (".select_vert", ".selection")  # attributes that conversion leaves behind
 
-# Display radii are told from those of a file or an artist by the low bits of their floats, which no other tool leaves so. They survive
+# Display radii are told from those of a file or an artist by the low 12 bits of their floats: these are a checksum of the others. They survive
 # deletion, joining and saving; scaling or setting radii ends it.
-_MARK, _MARK_BITS = np.uint32(0x5A5), np.uint32(0xFFF)
+_SUM_BITS, _SUM_FACTOR = np.uint32(0xFFF), np.uint32(2654435761)
 
-_FILL = 0.6  # of the local spacing, a display radius: spheres of a square grid touch diagonally
+_FILL = 1.4  # of the local spacing, a display radius: spheres of points that lie at random leave no gaps in which outlines would show
 _IN_CELL = 16.0  # points of a cell that a spacing is counted in
 _COUNTED = 1 << 21  # points, at most, that decide on the size of the cells
 _LAYOUTS = {'FLOAT': "value", 'INT': "value", 'INT8': "value", 'BOOLEAN': "value", 'FLOAT_VECTOR': "vector", 'FLOAT_COLOR': "color",
@@ -120,7 +120,8 @@ def finished(data: bpy.types.ID, cloud: bool) -> bpy.types.ID:
 def convert(objects: list[bpy.types.Object], kind: str) -> None:
     """Blender's own conversion of objects in the view layer, which are selected for it and nothing else. What was selected is again."""
     layer = bpy.context.view_layer
-    before, active = [obj for obj in layer.objects if obj.select_get()], layer.objects.active
+    layer.update()
+    before, active = [obj for obj in layer.objects if obj and obj.select_get()], layer.objects.active
     for obj in before:
         obj.select_set(False)
     for obj in objects:
@@ -163,7 +164,11 @@ def drop_display_radii(data: bpy.types.ID) -> None:
 def marked(radii: np.ndarray) -> np.ndarray:
     """Off by 0.1 % at most."""
     bits = np.ascontiguousarray(radii, np.float32).view(np.uint32)
-    return (bits & ~_MARK_BITS | _MARK).view(np.float32)
+    return (bits & ~_SUM_BITS | _checksum(bits)).view(np.float32)
+
+
+def _checksum(bits: np.ndarray) -> np.ndarray:
+    return (bits >> np.uint32(12)) * _SUM_FACTOR >> np.uint32(20)
 
 
 def are_for_display(data: bpy.types.ID) -> bool:
@@ -173,7 +178,8 @@ def are_for_display(data: bpy.types.ID) -> bool:
         return False
     values = np.empty(len(found.data), np.float32)
     found.data.foreach_get("value", values)
-    return bool((values.view(np.uint32) & _MARK_BITS == _MARK).all())
+    bits = values.view(np.uint32)
+    return bool((bits & _SUM_BITS == _checksum(bits)).all())
 
 
 def local_spacing(positions: np.ndarray) -> np.ndarray:

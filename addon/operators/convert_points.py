@@ -112,7 +112,7 @@ def _first_color(data: ID) -> str | None:
 def _copy_modifiers(source: Object, obj: Object, shown: dict[str, bool]) -> None:
     """Gives an object the modifiers of another, of these names, in their order."""
     collection, layer = bpy.context.scene.collection, bpy.context.view_layer
-    before, active = [item for item in layer.objects if item.select_get()], layer.objects.active
+    before, active = [item for item in layer.objects if item and item.select_get()], layer.objects.active
     collection.objects.link(source)
     try:
         for item in before:

@@ -6,6 +6,7 @@ import numpy as np
 from check_formats import range_image, text_file
 from check_import import import_ply, write_ply
 from harness import SCRATCH, check, check_close, color_name, drawn, new_scene, render
+from patina import point_data
 
 PTX = "3\n2\n{0} 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n{0} 0 0 1\n"
 WALL = "".join(f"{u / 4} 5 {v / 4} 0.5\n" for u in range(3) for v in range(2))
@@ -123,7 +124,7 @@ def test_meshes_are_graded():
     check_close(after[right][:, :3], 0.5 * before[right][:, :3], 0.005, "half as bright")
     colors = obj.data.attributes[color_name(obj)].data
     colors.foreach_set("color_srgb", np.tile(np.float32((1, 1, 1, 1)), len(colors)))
-    obj.data.update()
+    point_data.changed(obj.data)
     check_close(render()["Combined"][right][:, :3], np.full((right.sum(), 3), 0.5), 0.005, "of new colors")
 
 
@@ -135,7 +136,7 @@ def test_stations():
         before = set(bpy.data.objects)
         bpy.ops.import_scene.patina_points(filepath=str(path), link=link)
         new = set(bpy.data.objects) - before
-        obj, = (item for item in new if item.type == 'MESH')
+        obj, = (item for item in new if item.type in point_data.TYPES)
         empties = sorted((item for item in new if item.type == 'EMPTY'), key=lambda item: item["patina_station"])
         check([item.parent for item in empties] == [obj, obj], f"{new}")
         bpy.context.view_layer.update()
@@ -275,7 +276,7 @@ def test_ptx_is_range_images():
         scene = new_scene(64, 64)
         scene.camera.rotation_euler.x, scene.camera.data.type, scene.camera.data.ortho_scale = np.pi / 2, 'ORTHO', 3.5
         bpy.ops.import_scene.patina_points(filepath=str(path), link=link)
-        obj, = (item for item in bpy.data.objects if item.type == 'MESH')
+        obj, = (item for item in bpy.data.objects if item.type in point_data.TYPES)
         known, _ = told_of(obj)
         check([(scan.grid, scan.count) for scan in known] == [((17, 17), 288), ((13, 17), 220)], f"{known}")
         check_close([scan.interval for scan in known], [0.125, 0.125], 0.01, "intervals")
@@ -285,7 +286,7 @@ def test_ptx_is_range_images():
         bpy.context.view_layer.update()
         check_close([item.matrix_world.translation for item in empties], [(0, 0, 0), (1, -1, 0)], 1e-5, "stations")
         if not link:
-            scan = np.zeros(len(obj.data.vertices), np.int32)
+            scan = np.zeros(point_data.count_of(obj.data), np.int32)
             obj.data.attributes["scan"].data.foreach_get("value", scan)
             check(np.bincount(scan).tolist() == [288, 220], f"{np.bincount(scan)}")
         bpy.context.view_layer.objects.active = obj
@@ -400,5 +401,5 @@ def test_stations_survive_linking():
         empties = sorted((item for item in new if item.type == 'EMPTY'), key=lambda item: item["patina_station"])
         bpy.context.view_layer.update()
         check_close([item.matrix_world.translation for item in empties], [(110, 0, 0), (120, 0, 0)], 1e-3, "places")
-        own, = (item for item in new if item.type == 'MESH')
+        own, = (item for item in new if item.type in point_data.TYPES)
         check_close(told_of(own)[0][1].pose, (1, 0, 0, 120, 0, 1, 0, 0, 0, 0, 1, 0), 1e-3, "poses move too")

@@ -411,4 +411,4 @@ def test_brush_refuses():
     bpy.context.view_layer.objects.active = linked
     check("a linked file's points are not Blender's" in refused(), "a linked file")
     bpy.context.view_layer.objects.active = None
-    check("no mesh of points" in refused(), "nothing")
+    check("the active object has no points" in refused(), "nothing")
