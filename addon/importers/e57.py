@@ -15,7 +15,7 @@ from .. import jobs, native, readers, unpacking
 from ..unpacking import e57_xml
 from . import scans
 from .crs import units
-from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
+from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, regular, scanners_of
 
 PREVIEWED = 1 << 20  # bytes of XML that a preview reads
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
@@ -85,7 +85,7 @@ def _open(path: Path) -> File:
 
 def _head(path: Path, most: int | None = None) -> e57_xml.Head:
     try:
-        return e57_xml.read(path, most)
+        return e57_xml.read(regular(path), most)
     except OSError as error:
         raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror or error}", -3) from None
     except e57_xml.E57Error as error:
