@@ -260,7 +260,7 @@ def test_ptx_and_pts():
     began = time.process_time()
     points = read(many)
     assert len(points.positions) == 40_000 and time.process_time() - began < 4, time.process_time() - began
-    assert [text.partition(": ")[2] for text in points.warnings] == ["40000 scans have one point or none: scans 0, 1, 2, 3, 4, ..."], points.warnings[:3]
+    assert [text.partition(": ")[2] for text in points.warnings] == ["40000 scans have one point each: scans 0, 1, 2, 3, 4, ..."], points.warnings[:3]
 
 
 def pcd_text(data="ascii", body="1 2 3\n" * 12, **changed):
