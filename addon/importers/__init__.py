@@ -14,7 +14,7 @@ import numpy as np
 from .. import point_data
 from ..jobs import Steps
 from ..native import PatinaError
-from .reading import Filter, Pieces, PointFile, Progress, name_of, told
+from .reading import Filter, Pieces, PointFile, Progress, name_of, regular, told
 
 __all__ = ["FORMATS", "Filter", "Pieces", "PointFile", "Progress", "in_pieces", "name_of", "preview", "reader", "steps", "to_data", "told"]
 
@@ -44,6 +44,7 @@ def reader(path: Path) -> ModuleType:
         raise PatinaError("the points of EPT folders are read as pictures want them, not whole: turn Link on", -5)
     if name is None:
         raise PatinaError(f"'{path.suffix}' is none of {' '.join(FORMATS)}", -5)
+    regular(path)
     return import_module(f"{__name__}.{name}")
 
 

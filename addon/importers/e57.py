@@ -15,11 +15,11 @@ from .. import jobs, native, readers, unpacking
 from ..unpacking import e57_xml
 from . import scans
 from .crs import units
-from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
+from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, regular, scanners_of
 
 PREVIEWED = 1 << 20  # bytes of XML that a preview reads
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
-MOST_WARNINGS = 8  # of one file
+LISTED = 5  # scans that a warning names
 CELLS = 1 << 24  # a grid's rows or columns: more are no whole numbers in float32
 
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
@@ -85,7 +85,7 @@ def _open(path: Path) -> File:
 
 def _head(path: Path, most: int | None = None) -> e57_xml.Head:
     try:
-        return e57_xml.read(path, most)
+        return e57_xml.read(regular(path), most)
     except OSError as error:
         raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror or error}", -3) from None
     except e57_xml.E57Error as error:
@@ -114,7 +114,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     parts: list[dict[str, np.ndarray]] = []
     stations: list[np.ndarray] = []
     poses: list[Pose] = []
-    warnings: list[str] = []
+    faults: list[tuple[str, int, str]] = []
     failed: native.PatinaError | None = None
     done, read, index = 0, 0, 0
     try:
@@ -125,15 +125,16 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             stations.append(_station(scan, pose))
             poses.append(pose or Pose())
             if wrong:
-                warnings.append(f"{what}{wrong}")
+                faults.append(("are left out, because their quaternions or places are no poses" if pose is None else
+                               "have quaternions of other lengths than 1, which are taken as of length 1", index, wrong))
             if pose is None:
                 continue
             if scan.points < 2:
-                warnings.append(f"{what} has {'one point' if scan.points else 'no points'}")
+                faults.append(("have one point each", index, " has one point") if scan.points else ("have no points", index, " has no points"))
             first, before = len(parts), read
             if scan.points and not _has_places(scan):
                 failed = native.PatinaError(f"{what}: its points have no positions: {', '.join(field.name for field in scan.fields)}", -4)
-                warnings.append(str(failed))
+                faults.append(("have points without positions", index, str(failed).removeprefix(what)))
                 continue
             for found in _pieces(file, index, pose):
                 progress.step(read / total)
@@ -146,7 +147,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
                     parts.append(part | {"scan": np.full(int(keep.sum()), index, np.float32)})
                 yield jobs.Pause()
             if read - before < scan.points:
-                warnings.append(f"{what} announces {scan.points:,} points and holds {read - before:,}")
+                faults.append(("hold fewer points than they announce", index, f" announces {scan.points:,} points and holds {read - before:,}"))
             _level_colors(scan, parts[first:])
     except native.PatinaError as error:
         if error.code == native.CANCELLED:
@@ -161,17 +162,27 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     crs = file.head.crs
     points = merge(path.stem, parts, {"crs": crs, **crs_notes(units(crs))} if crs else {})
     points.notes |= scanners_of(stations if np.isfinite(stations).any() else [], points.origin)
-    points.notes |= scans.note(_described(file.scans, points, stations, poses, path.name))
-    points.warnings = joined(path.name, warnings + points.warnings)
+    points.notes |= scans.note(_described(file.scans, points, stations, poses, faults))
+    points.warnings += joined(path.name, faults)
     if wanted.every == 1:  # a thinned grid is none
         yield from grid_normals(points, stations, progress)
     return points
 
 
-def joined(name: str, warnings: list[str]) -> list[str]:
-    """The first few, and how many more there are: a file of thousands of scans may have as many faults."""
-    more = len(warnings) - MOST_WARNINGS
-    return warnings if more <= 0 else [*warnings[:MOST_WARNINGS - 1], f"{name}: {more + 1:,} more scans have such faults"]
+def joined(name: str, faults: list[tuple[str, int, str]]) -> list[str]:
+    """A warning for each kind of fault, however many scans have it. faults: what several scans have in common, the scan's number, and
+    what is wrong with this one."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for kind, index, text in faults:
+        found.setdefault(kind, []).append((index, text))
+    told = []
+    for kind, those in found.items():
+        if len(those) == 1:
+            told.append(f"{name}: scan {those[0][0]}{those[0][1]}")
+        else:
+            numbers = ", ".join(str(index) for index, _ in those[:LISTED]) + ", ..." * (len(those) > LISTED)
+            told.append(f"{name}: {len(those):,} scans {kind}: scans {numbers}")
+    return told
 
 
 def _pose(scan: e57_xml.Scan) -> tuple[Pose | None, str]:
@@ -201,8 +212,9 @@ def _station(scan: e57_xml.Scan, pose: Pose | None) -> np.ndarray:
     return pose.place.copy() if known else np.full(3, np.nan)
 
 
-def _described(headers: list[e57_xml.Scan], points: PointFile, stations: list[np.ndarray], poses: list[Pose], name: str) -> list[scans.Scan]:
-    """What is known of each scan; says at the points what is wrong with their grids."""
+def _described(headers: list[e57_xml.Scan], points: PointFile, stations: list[np.ndarray], poses: list[Pose],
+               faults: list[tuple[str, int, str]]) -> list[scans.Scan]:
+    """What is known of each scan; adds what is wrong with their grids to the faults."""
     found = []
     of = points.scalars.get("scan", np.empty(0, np.float32))
     for index, header in enumerate(headers):
@@ -214,9 +226,9 @@ def _described(headers: list[e57_xml.Scan], points: PointFile, stations: list[np
             row, column = (points.scalars[axis][own] for axis in ("row", "column"))
             good = (row >= 0) & (column >= 0) & (row < CELLS) & (column < CELLS)
             if not good.all():
-                points.warnings.append(f"{name}: scan {index}: {int((~good).sum()):,} points lie in no cell of its grid")
+                faults.append(("have points in no cell of their grids", index, f": {int((~good).sum()):,} points lie in no cell of its grid"))
             if taken := scans.twice(row[good], column[good]):
-                points.warnings.append(f"{name}: scan {index}: {taken:,} points lie in cells of its grid that others have")
+                faults.append(("have several points in one cell of their grids", index, f": {taken:,} points lie in cells of its grid that others have"))
             interval = scans.interval(places[good], row[good], column[good])
             grid = (int(column[good].max(initial=-1)) + 1, int(row[good].max(initial=-1)) + 1)
         found.append(scans.Scan(header.name, len(places), direction, interval, poses[index].matrix(), grid))

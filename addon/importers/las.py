@@ -15,9 +15,10 @@ import numpy as np
 
 from .. import jobs, native, readers, unpacking
 from . import crs
-from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, name_of, origin_of
+from .reading import Filter, Pieces, PointFile, Progress, colors_of, crs_notes, name_of, origin_of, regular
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
+FEW = 1000  # points that tell where a file lies
 
 _OLD = [("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("intensity", "<u2"), ("bit_fields", "u1"),
         ("raw_classification", "u1"), ("scan_angle_rank", "i1"), ("user_data", "u1"), ("point_source_id", "<u2")]
@@ -94,6 +95,8 @@ class Header:
     laszip: bytes = b""  # the record that says how points are packed
     extras: tuple[Extra, ...] = ()
     units: crs.Units | None = None
+    warnings: tuple[str, ...] = ()
+    end: int | None = None  # byte behind the points, where the file says what follows them
 
 
 def _fail(path: Path, what: str) -> native.PatinaError:
@@ -101,18 +104,23 @@ def _fail(path: Path, what: str) -> native.PatinaError:
 
 
 def read_header(path: Path) -> Header:
-    with open(path, "rb") as file:
+    with open(regular(path), "rb") as file:
         head = file.read(375)
         if len(head) < 227 or head[:4] != b"LASF":
             raise _fail(path, "not a LAS file: its first bytes are not 'LASF'")
         header_size, data_offset, records, form, record_size, count = struct.unpack_from("<HIIBHI", head, 94)
         box = struct.unpack_from("<12d", head, 131)
+        end = None
         if head[24:26] >= b"\x01\x04" and len(head) >= 255:
+            end = struct.unpack_from("<Q", head, 235)[0] or None
             count = struct.unpack_from("<Q", head, 247)[0] or count
+        if header_size < 227 or data_offset < header_size:
+            raise _fail(path, f"its points begin at byte {data_offset:,}, its header takes {header_size:,} bytes and at least 227")
+        warnings = [f"{path.name}: {text}" for text in _overlap(file, header_size, min(records, 4096), data_offset)]
         words, extras, keys, laszip = _records(file, head, header_size, min(records, 4096), data_offset)
     return Header(f"{head[24]}.{head[25]}", count, form & 0x3F, bool(form & 0xC0), record_size, data_offset,
                   np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), words, laszip, extras,
-                  crs.units(words, keys))
+                  crs.units(words, keys), tuple(warnings), end)
 
 
 def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int
@@ -173,6 +181,19 @@ def _behind(file: BinaryIO, head: bytes) -> Iterator[tuple[bytes, int, bytes]]:
         at += 60 + length
 
 
+def _overlap(file: BinaryIO, at: int, records: int, end: int) -> Iterator[str]:
+    """Says which of the records before the points reaches into them, if one does."""
+    for index in range(records):
+        file.seek(at)
+        record = file.read(54)
+        if len(record) < 54:
+            return
+        at += 54 + struct.unpack_from("<H", record, 20)[0]
+        if at > end:
+            yield f"its record {index} of {records:,} ends at byte {at:,}, where its points begin at byte {end:,} already"
+            return
+
+
 def _extra(record: bytes) -> Extra:
     kind, options = record[2], record[3]
     name = record[4:36].split(b"\0")[0].decode("utf-8", "replace").strip()
@@ -184,7 +205,7 @@ def _extra(record: bytes) -> Extra:
 
 def is_copc(path: Path) -> int | None:
     """How many points a COPC holds; None for other files."""
-    with open(path, "rb") as file:
+    with open(regular(path), "rb") as file:
         head = file.read(429)
     if len(head) < 429 or head[:4] != b"LASF" or head[377:381] != b"copc":
         return None
@@ -224,12 +245,15 @@ def _record(path: Path, header: Header) -> np.dtype:
 def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray | None]:
     """Records, size at a time; None: nothing yet."""
     kind = _record(path, header)
+    have = (path.stat().st_size - header.data_offset) // kind.itemsize
+    if have < header.points and not header.compressed:
+        raise _fail(path, f"ends after {max(have, 0):,} of {header.points:,} points")
+    if not (np.isfinite([header.scale, header.offset]).all() and (header.scale != 0.0).all()):
+        numbers = " ".join(f"{value:g}" for value in (*header.scale, *header.offset))
+        raise _fail(path, f"its scale and offset are 0 or no numbers: {numbers}")
     if header.compressed:
         yield from _unpacked(path, header, kind, size)
         return
-    have = (path.stat().st_size - header.data_offset) // kind.itemsize
-    if have < header.points:
-        raise _fail(path, f"ends after {max(have, 0):,} of {header.points:,} points")
     for first in range(0, header.points, size):
         yield np.fromfile(path, kind, min(size, header.points - first), offset=header.data_offset + first * kind.itemsize)
 
@@ -295,7 +319,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
 
 
 def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
-    origin = origin_of(header.lower, header.upper, float(header.scale.min()))
+    origin = _origin(path, header)
     columns = _Columns(header.points)
     done = 0
     with contextlib.closing(_pieces(path, header, SMALL_PIECE)) as pieces:
@@ -308,6 +332,38 @@ def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> job
                 columns.add(_extras(header, piece, keep) | {"positions": positions[keep]} | _fields(piece, keep))
             yield jobs.Pause()
     return _assemble(path, header, origin, columns)
+
+
+def _box_is_wrong(header: Header) -> bool:
+    """Whether the box of all points is where no point of the file's scale and offset can be."""
+    reach = np.abs(header.scale) * 2.0 ** 31 * (1.0 + 1e-6)
+    inside = (header.lower >= header.offset - reach) & (header.upper <= header.offset + reach) & (header.lower <= header.upper)
+    return bool(header.points) and not inside.all()  # nor NaN
+
+
+def _origin(path: Path, header: Header) -> tuple[float, float, float]:
+    """From the box of all points; from the first points where that box is wrong."""
+    lower, upper = header.lower, header.upper
+    if _box_is_wrong(header):
+        with contextlib.closing(_pieces(path, header, FEW)) as pieces:
+            first = next((piece for piece in pieces if piece is not None), None)
+        if first is not None:
+            places = np.stack([first[axis] for axis in "XYZ"], 1) * header.scale + header.offset
+            lower, upper = places.min(axis=0), places.max(axis=0)
+    return origin_of(lower, upper, float(np.abs(header.scale).min()))
+
+
+def _faults(path: Path, header: Header) -> list[str]:
+    """Warnings on what the header says: records within the points, another number of points, a box where no point can be."""
+    found = list(header.warnings)
+    end = path.stat().st_size if header.end is None else min(header.end, path.stat().st_size)
+    more = (end - header.data_offset) // max(header.record_size, 1) - header.points
+    if more > 0 and not header.compressed and (header.end is not None or header.version <= "1.2"):
+        found.append(f"{path.name}: announces {header.points:,} points; {more:,} more records follow, which are left out")
+    if _box_is_wrong(header):
+        box = " ".join(f"{value:g}" for value in (*header.lower, *header.upper))
+        found.append(f"{path.name}: its box, {box}, is not of its points, and is not used")
+    return found
 
 
 def _places(header: Header, piece: np.ndarray, origin: tuple[float, float, float]) -> np.ndarray:
@@ -343,7 +399,7 @@ def in_pieces(path: Path, least: int, names: Collection[str], _progress: Progres
     yield from ()
     if header.points <= least:
         return None
-    origin = origin_of(header.lower, header.upper, float(header.scale.min()))
+    origin = _origin(path, header)
     return Pieces(header.points, origin, (tuple(header.lower.tolist()), tuple(header.upper.tolist())), crs_notes(header.units),
                   lambda progress: _told(path, header, _each(path, header, origin, frozenset(names), progress)))
 
@@ -425,7 +481,7 @@ def _normals_of(header: Header, columns: _Columns) -> np.ndarray | None:
 def _assemble(path: Path, header: Header, origin: tuple[float, float, float], columns: _Columns) -> PointFile:
     positions = columns.take("positions")
     if positions is None:
-        return PointFile(name_of(path), np.empty((0, 3), np.float32), None, None, {}, origin, 0)
+        return PointFile(name_of(path), np.empty((0, 3), np.float32), None, None, {}, origin, 0, {}, _faults(path, header))
     notes: dict[str, str | float] = {"crs": header.crs} if header.crs else {}
     notes |= crs_notes(header.units)
     rgb = columns.take("rgb")
@@ -447,4 +503,4 @@ def _assemble(path: Path, header: Header, origin: tuple[float, float, float], co
         scalars[name] = values if values.dtype.itemsize == 1 else values.astype(np.float32)
     degrees = header.units is not None and header.units.degrees
     warnings = [f"{path.name}: its coordinates are longitude and latitude in degrees; project them to see right shapes"] * degrees
-    return PointFile(name_of(path), positions, normals, colors, scalars, origin, 0, notes, warnings)
+    return PointFile(name_of(path), positions, normals, colors, scalars, origin, 0, notes, _faults(path, header) + warnings)

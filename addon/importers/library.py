@@ -11,7 +11,7 @@ import numpy as np
 from .. import jobs, native
 from ..native.rows import Rows
 from . import scans
-from .reading import ZERO, Filter, Pieces, PointFile, Progress, scanners_of
+from .reading import ZERO, Filter, Pieces, PointFile, Progress, regular, scanners_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 MOST_LISTS = 1 << 23  # rows with lists that are gone through at one go, which takes some 0.1 s
@@ -54,7 +54,7 @@ def in_pieces(path: Path, least: int, names: Collection[str], progress: Progress
     the library reads the file whole, of a text, all of which would have to be looked through to know the first thing of it, and of many lists."""
     yield from ()
     try:
-        with open(path, "rb") as file:
+        with open(regular(path), "rb") as file:
             head = file.read(65536)
     except OSError:
         return None  # whoever reads it whole says what is wrong
@@ -101,7 +101,7 @@ def _lists(head: bytes) -> int:
 
 def preview(path: Path) -> list[str]:
     """What the head of the file says: a PLY's header, else the first lines."""
-    with open(path, "rb") as file:
+    with open(regular(path), "rb") as file:
         head = file.read(65536)
     if path.suffix.lower() == ".conf":
         names = [words[1] for line in head.decode("utf-8", "replace").splitlines() if (words := line.split())[:1] == ["bmesh"]

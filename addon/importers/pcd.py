@@ -3,18 +3,20 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
 
 from .. import jobs, native
-from .reading import Filter, PointFile, Progress, grid_normals, origin_of, scanners_of
+from .reading import Filter, PointFile, Progress, grid_normals, origin_of, regular, scanners_of
 
 _KINDS = {("F", 4): "<f4", ("F", 8): "<f8", ("U", 1): "u1", ("U", 2): "<u2", ("U", 4): "<u4", ("U", 8): "<u8",
           ("I", 1): "i1", ("I", 2): "<i2", ("I", 4): "<i4", ("I", 8): "<i8"}
 
 
 TEXT_PIECE = 1 << 19  # bytes that take some 30 ms
+MOST_FIELDS = 1024
 COPIES = 1 << 16  # of a compressed file, the same
 
 
@@ -41,7 +43,12 @@ def _header(path: Path, head: bytes) -> tuple[dict[str, list[str]], int]:
 
 def _columns(path: Path, words: dict[str, list[str]]) -> np.dtype:
     fields = words["FIELDS"]
+    if len(fields) > MOST_FIELDS:
+        raise _fail(path, f"it has {len(fields):,} fields; at most {MOST_FIELDS:,} are read")
     counts = words.get("COUNT", ["1"] * len(fields))
+    for name, count in zip(fields, counts, strict=False):
+        if not count.isascii() or not count.isdigit() or not 0 < len(count) < 9 or not int(count):
+            raise _fail(path, f"COUNT of field '{name[:40]}' is {count[:40]}; at least 1 is needed")
     try:
         kinds = [_KINDS[kind, int(size)] for kind, size in zip(words["TYPE"], words["SIZE"], strict=True)]
         return np.dtype([(f"{name}.{i}" if name in fields[:i] or name == "_" else name, kind, (int(count),))
@@ -52,13 +59,30 @@ def _columns(path: Path, words: dict[str, list[str]]) -> np.dtype:
 
 def _count(path: Path, words: dict[str, list[str]]) -> int:
     try:
-        return int(words["POINTS"][0]) if "POINTS" in words else int(words["WIDTH"][0]) * int(words["HEIGHT"][0])
+        numbers = {name: int(words[name][0]) for name in ("POINTS", "WIDTH", "HEIGHT") if name in words}
+        count = numbers["POINTS"] if "POINTS" in numbers else numbers["WIDTH"] * numbers["HEIGHT"]
     except (KeyError, IndexError, ValueError):
         raise _fail(path, "says not how many points it holds") from None
+    for name, number in numbers.items():
+        if number < 0:
+            raise _fail(path, f"{name} is {number:,}; it must not be below 0")
+    return count
+
+
+def _faults(path: Path, words: dict[str, list[str]], count: int, held: int) -> list[str]:
+    """Warnings where the header contradicts itself, or the data. held: points that the data hold."""
+    found = []
+    if held > count:
+        found.append(f"{path.name}: announces {count:,} points; its data hold {held:,}, of which the others are left out")
+    with contextlib.suppress(KeyError, IndexError, ValueError):
+        width, height = int(words["WIDTH"][0]), int(words["HEIGHT"][0])
+        if width * height != count:
+            found.append(f"{path.name}: POINTS is {count:,}, where WIDTH x HEIGHT is {width:,} x {height:,}: it is read without rows and columns")
+    return found
 
 
 def preview(path: Path) -> list[str]:
-    with open(path, "rb") as file:
+    with open(regular(path), "rb") as file:
         words, _ = _header(path, file.read(65536))
     return [f"PCD {' '.join(words['DATA'])}", f"{_count(path, words):,} points", " ".join(words["FIELDS"])]
 
@@ -71,24 +95,25 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     """The same with a pause after each piece of what takes long: text, and what is compressed."""
     progress.step(0.0)
     try:
-        data = path.read_bytes()
+        data = regular(path).read_bytes()
     except OSError as error:
         raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror}", -3) from None
     words, at = _header(path, data[:1 << 20])
     kind, count, form = _columns(path, words), _count(path, words), words["DATA"][0]
     if form == "ascii":
-        table = yield from _ascii(path, data[at:], kind, count, progress)
+        table, held = yield from _ascii(path, data[at:], kind, count, progress)
     elif form == "binary":
         if len(data) - at < count * kind.itemsize:
             raise _fail(path, f"ends after {(len(data) - at) // kind.itemsize:,} of {count:,} points")
         rows = np.frombuffer(data, kind, count, at)
-        table = {name: rows[name] for name in kind.names}
+        table, held = {name: rows[name] for name in kind.names}, (len(data) - at) // kind.itemsize
     elif form == "binary_compressed":
-        table = yield from _compressed(path, data, at, kind, count, progress)
+        table, held = (yield from _compressed(path, data, at, kind, count, progress)), count
     else:
         raise _fail(path, f"DATA {form} is not ascii, binary or binary_compressed")
     station = _organise(words, table, count)
     points = _assemble(path, table, wanted)
+    points.warnings += _faults(path, words, count, held)
     if station is not None:
         points.notes |= scanners_of([station], points.origin)
         if wanted.every == 1:  # a thinned grid is none
@@ -110,7 +135,9 @@ def _organise(words: dict[str, list[str]], table: dict[str, np.ndarray], count: 
     return np.zeros(3) if place == [0.0, 0.0, 0.0] else None
 
 
-def _ascii(path: Path, text: bytes, kind: np.dtype, count: int, progress: Progress) -> jobs.Steps[dict[str, np.ndarray]]:
+def _ascii(path: Path, text: bytes, kind: np.dtype, count: int, progress: Progress) \
+        -> jobs.Steps[tuple[dict[str, np.ndarray], int]]:
+    """The columns, and how many points the text holds."""
     width = sum(kind[name].shape[0] for name in kind.names)
     pieces, at = [np.empty(0)], 0
     while at < len(text):
@@ -131,7 +158,7 @@ def _ascii(path: Path, text: bytes, kind: np.dtype, count: int, progress: Progre
         size = kind[name].shape[0]
         table[name] = rows[:, at:at + size].astype(kind[name].base)
         at += size
-    return table
+    return table, len(words) // width
 
 
 def _compressed(path: Path, data: bytes, at: int, kind: np.dtype, count: int, progress: Progress) \
@@ -171,6 +198,8 @@ def _unpack(path: Path, packed: bytes, size: int, progress: Progress) -> jobs.St
                 plain += plain[start:start + length]
             else:
                 plain += (plain[start:] * (length // back + 1))[:length]
+            if len(plain) > size:
+                raise _fail(path, f"unpacks to more than the {size:,} bytes of its points")
             polled += 1
             if polled % COPIES == 0:
                 progress.step(at / end)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import stat
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -171,6 +172,15 @@ def _opaque(rgb: np.ndarray, pieces: list[slice], kind: type, one: float,
     for piece in pieces:
         rgba[piece, :3] = convert(rgb[piece])
     return rgba
+
+
+def regular(path: Path) -> Path:
+    """The path. PatinaError where it is there and no file: opening a named pipe waits for who writes into it."""
+    with contextlib.suppress(OSError, ValueError):
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            raise native.PatinaError(f"{path.name}: is {'a folder' if stat.S_ISDIR(mode) else 'a device or pipe'}, not a file", native.FILE)
+    return path
 
 
 def told(text: object) -> str:

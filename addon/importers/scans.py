@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class Scan:
 
 
 def packed(scans: Sequence[Scan]) -> str:
-    return json.dumps([asdict(scan) for scan in scans])
+    return json.dumps([vars(scan) for scan in scans])
 
 
 def unpacked(text: object) -> list[Scan]:

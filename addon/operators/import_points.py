@@ -194,7 +194,10 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         context.collection.objects.link(obj)
         styles.dress(context.scene, obj)
         if self.stations:
-            stations.add(obj, [context.collection])
+            added = stations.add(obj, [context.collection])
+            left = len(stations.missing(obj)) if added == stations.MOST else 0
+            if left:
+                self._tell('WARNING', f"'{obj.name}' has {added + left:,} stations; the first {added:,} have empties. Add Stations adds more")
         obj.select_set(True)
         context.view_layer.objects.active = obj
 

@@ -78,6 +78,8 @@ class FileSource(Source):
     def __init__(self, path: str) -> None:
         self.name = path
         self._lock = threading.Lock()
+        if os.path.exists(path) and not os.path.isfile(path):
+            raise SourceError("is no file")  # a named pipe would wait for who writes into it
         try:
             self._file = open(path, "rb")  # noqa: SIM115  for as long as the process runs
         except OSError as error:

@@ -135,7 +135,7 @@ void pt_file_end_scan(struct patina_file *file, uint64_t missing, uint64_t surpl
 
 // ---- what is wrong with them -----------------------------------------------------------------------------------------
 
-enum fault { CUT, SURPLUS, NO_POSE, FEW, FAULTS };
+enum fault { CUT, SURPLUS, NO_POSE, NO_POINTS, ONE_POINT, FAULTS };
 enum { LISTED = 5 }; // scans that a warning names
 
 static uint64_t amount(const struct pt_scan *scan, enum fault fault)
@@ -144,7 +144,8 @@ static uint64_t amount(const struct pt_scan *scan, enum fault fault)
     case CUT: return scan->missing;
     case SURPLUS: return scan->surplus;
     case NO_POSE: return scan->nowhere;
-    default: return !scan->nowhere && scan->count < 2;
+    case NO_POINTS: return !scan->nowhere && !scan->count;
+    default: return !scan->nowhere && scan->count == 1;
     }
 }
 
@@ -174,7 +175,8 @@ static void tell_several(const char *name, enum fault fault, uint32_t count, uin
         pt_log(PT_LOG_WARNING, "%s: %u scans are left out, because their matrices are none of a pose: %s", name, count,
                numbers);
     else
-        pt_log(PT_LOG_WARNING, "%s: %u scans have one point or none: %s", name, count, numbers);
+        pt_log(PT_LOG_WARNING, "%s: %u scans have %s: %s", name, count, fault == ONE_POINT ? "one point each" : "no points",
+               numbers);
 }
 
 void pt_file_tell_scans(const struct patina_file *file, const char *name)

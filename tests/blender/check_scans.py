@@ -7,6 +7,7 @@ from check_formats import range_image, text_file
 from check_import import import_ply, write_ply
 from harness import SCRATCH, check, check_close, color_name, drawn, new_scene, render
 from patina import point_data
+from patina.operators import stations
 
 PTX = "3\n2\n{0} 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n{0} 0 0 1\n"
 WALL = "".join(f"{u / 4} 5 {v / 4} 0.5\n" for u in range(3) for v in range(2))
@@ -151,6 +152,22 @@ def test_stations():
     check(len(obj.children) == 2 and not bpy.ops.object.patina_add_stations.poll(), "converted they stay, once")
     other, = import_ply(path, stations=False)
     check(not other.children, "not where they are not wanted")
+
+
+def test_many_stations_come_in_parts():
+    """Thousands of scans: Blender would take half a minute for their empties, so the import adds the first of them."""
+    new_scene()
+    path = text_file("many.ptx", "".join(PTX.format(10 * i) + WALL for i in range(1, 6)))
+    most, stations.MOST = stations.MOST, 2
+    try:
+        obj, = import_ply(path)
+        for wanted in ([0, 1], [0, 1, 2, 3], [0, 1, 2, 3, 4]):
+            check(sorted(child["patina_station"] for child in obj.children) == wanted, f"{[child.name for child in obj.children]}")
+            bpy.context.view_layer.objects.active = obj
+            if len(wanted) < 5:
+                bpy.ops.object.patina_add_stations()
+    finally:
+        stations.MOST = most
 
 
 def overlap(count, rng, outliers=0.1):

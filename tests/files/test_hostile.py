@@ -223,6 +223,100 @@ def test_unpacking_is_cancelled():
     assert not set(Path(tempfile.gettempdir()).glob("patina-unpack-*")) - before
 
 
+def test_las_heads():
+    """Points within the header, scales that are none: messages. Other numbers of points, records within the points and a wrong box: warnings."""
+    for offset in (0, 100, 226):
+        told = message(written("offset.las", las_bytes(offset=offset)))
+        assert f"begin at byte {offset}, its header takes 227 bytes" in told, told
+    assert "at least 227" in message(written("header.las", las_bytes(header=100)))
+    assert "ends after 0 of 1,000 points" in message(written("offset.las", las_bytes(offset=1 << 31)))
+    for scale in ((0, 1, 1), (float("nan"), 1, 1), (1, float("inf"), 1)):
+        assert "its scale and offset are 0 or no numbers" in message(written("scale.las", las_bytes(scale=scale)))
+    points = read(written("few.las", las_bytes(10, rows=1000)))
+    assert len(points.positions) == 10 and points.warnings == ["few.las: announces 10 points; 990 more records follow, which are left out"]
+    points = read(written("none.las", las_bytes(0, rows=1000)))
+    assert not len(points.positions) and "1,000 more records follow" in points.warnings[0], points.warnings
+    points = read(written("records.las", las_bytes(records=3)))
+    assert "its record 0 of 3 ends at byte" in points.warnings[0], points.warnings
+    for box in ((1e12, 1e12, 0, 0, 0, 0), (-5, 5, 0, 0, 0, 0), (float("nan"),) * 6):
+        points = read(written("box.las", las_bytes(box=box)))
+        assert np.allclose(points.positions[:, 0] + points.origin[0], np.arange(1000) / 1000, atol=1e-6), (box, points.positions[:3], points.origin)
+        assert "its box" in points.warnings[0], points.warnings
+    assert read(written("good.las", las_bytes())).warnings == []
+
+
+# ---- texts and PCD
+
+PTX = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+
+
+def test_ptx_and_pts():
+    """As the command line, by the same reader: tests/unit/test_text.c. Thousands of scans take no quadratic time, and one warning."""
+    for size in ("-1\n5", "4294967296\n1", "1000000000\n1000000000", "1e30\n1", "nan\ninf"):
+        assert "line 1: scan 0 announces a grid" in message(written("head.ptx", f"{size}\n{PTX}1 2 3 0.5\n"))
+    points = read(written("few.pts", "1000000000\n1 2 3 4 5 6 7\n"))
+    assert len(points.positions) == 1 and "announces 1000000000 points, the file holds 1" in points.warnings[0], points.warnings
+    many = written("many.ptx", "".join(f"1\n1\n{i} 0 0\n{PTX[6:-8]}{i} 0 0 1\n1 2 3 0.5\n" for i in range(40_000)))
+    began = time.process_time()
+    points = read(many)
+    assert len(points.positions) == 40_000 and time.process_time() - began < 4, time.process_time() - began
+    assert [text.partition(": ")[2] for text in points.warnings] == ["40000 scans have one point each: scans 0, 1, 2, 3, 4, ..."], points.warnings[:3]
+
+
+def pcd_text(data="ascii", body="1 2 3\n" * 12, **changed):
+    head = {"FIELDS": "x y z", "SIZE": "4 4 4", "TYPE": "F F F", "COUNT": "1 1 1", "WIDTH": "12", "HEIGHT": "1", "POINTS": "12"} | changed
+    return "VERSION .7\n" + "".join(f"{key} {value}\n" for key, value in head.items() if value is not None) + f"DATA {data}\n" + body
+
+
+def test_pcd():
+    assert len(read(written("good.pcd", pcd_text())).positions) == 12
+    for changed, part in (({"COUNT": "0 1 1"}, "COUNT of field 'x' is 0"), ({"COUNT": "-1 1 1"}, "COUNT of field 'x' is -1"),
+                          ({"COUNT": "1e9 1 1"}, "COUNT of field 'x'"), ({"COUNT": "99999999 1 1"}, "ends after 0 of 12 points"),
+                          ({"POINTS": "-5"}, "POINTS is -5"), ({"POINTS": None, "WIDTH": "-3", "HEIGHT": "-4"}, "WIDTH is -3"),
+                          ({"POINTS": "9" * 5000}, "says not how many"), ({"POINTS": "1000000000"}, "of 1,000,000,000 points"),
+                          ({"FIELDS": " ".join(["x"] * 100_000)}, "100,000 fields"), ({"SIZE": "4 4 16"}, "do not fit together")):
+        told = message(written("bad.pcd", pcd_text(**changed)))
+        assert part in told, told
+    points = read(written("few.pcd", pcd_text(POINTS="5", WIDTH="5")))
+    assert len(points.positions) == 5 and "announces 5 points; its data hold 12" in points.warnings[0], points.warnings
+    points = read(written("grid.pcd", pcd_text(WIDTH="5", HEIGHT="7")))
+    assert "WIDTH x HEIGHT is 5 x 7" in points.warnings[0], points.warnings
+    packed = pcd_text("binary_compressed", "").encode() + struct.pack("<II", 64, 144) + b"\x00a" + b"\xe0\xff\x00" * 20 + bytes(2)
+    assert "more than the 144 bytes" in message(written("bomb.pcd", packed))
+
+
+def test_shared_files():
+    """Those that failed first."""
+    folder = SHARED / "formats/hostile"
+    if not folder.is_dir():
+        raise Skip("there is no ../shared/data/formats/hostile")
+    for path in sorted(folder.glob("*.*")):
+        if path.suffix == ".pts":
+            assert read(path).warnings, path
+        elif path.suffix != ".md" and not (path.suffix == ".laz" and readers.lacks("lazrs")):
+            message(path)
+
+
+def test_pipes():
+    """A named pipe is no file; nothing waits for who writes into it."""
+    if os.name == "nt":
+        raise Skip("Windows has no named pipes among files")
+    for ending in (".ply", ".xyz", ".ptx", ".pcd", ".las", ".laz", ".e57"):
+        path = SCRATCH / f"pipe{ending}"
+        os.mkfifo(path)
+        if ending == ".laz":
+            needs("lazrs")
+        assert "is a device or pipe, not a file" in message(path)
+        module = READERS.get(ending, library)
+        for run in (lambda: module.preview(path), lambda: list(module.in_pieces(path, 1, (), reading.Progress()))):
+            try:
+                run()
+            except native.PatinaError as error:
+                assert "pipe" in str(error) or "package" in str(error), error
+            except AttributeError:
+                assert module is pcd  # which has no pieces
+
+
 # ---- E57
 
 def crc32c(data):
