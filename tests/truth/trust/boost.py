@@ -7,10 +7,19 @@ over samples are exact in any order (Chen and Guestrin 2016 for the gain)."""
 
 from __future__ import annotations
 
+import ctypes
+import functools
 import math
+import os
+import subprocess
+from ctypes import c_int32, c_int64, c_void_p
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[2]
 
 BINS = 32
 DEPTH = 4
@@ -22,6 +31,7 @@ LEAST = 40.0  # of the second derivatives in a leaf, in samples times a quarter
 DAMPED = 8.0  # added to a leaf's second derivatives
 LEVELS = 16  # of trust, in four bits
 TRUST = 1.0 - ((LEVELS - 1 - np.arange(LEVELS)) / (LEVELS - 1)) ** 2
+QUANTILES = 200_000  # samples that thresholds are taken from
 NEVER = 1 << 30  # a score that none reaches
 LEAF = 0xFFFF  # in place of a node's feature
 STEP = 16  # units of a score between two entries of SIGMOID
@@ -91,63 +101,76 @@ class Forest:
         return out
 
 
+@functools.cache
+def _library() -> ctypes.CDLL:
+    """trees.c, compiled where it is not yet."""
+    path = ROOT / "build/out/truth-cache/libtruth_trees.so"
+    if not path.is_file() or path.stat().st_mtime < max((HERE / f"trees.{ending}").stat().st_mtime for ending in "ch"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(f".{os.getpid()}")
+        subprocess.run([os.environ.get("CC", "cc"), "-std=c11", "-O3", "-fPIC", "-shared", "-o", str(partial),
+                        str(HERE / "trees.c")], check=True)
+        partial.replace(path)
+    library = ctypes.CDLL(str(path))
+    library.trees_sums.restype = library.trees_leaves.restype = None
+    library.trees_sums.argtypes = (c_void_p, c_int64, c_void_p, c_int64, c_void_p, c_int32, c_void_p, c_int32, c_int32, c_void_p,
+                                   c_void_p, c_void_p)
+    library.trees_leaves.argtypes = (c_void_p, c_int64, c_int64, c_void_p, c_void_p, c_int32, c_void_p)
+    return library
+
+
 def leaves_of(bins: np.ndarray, feature: np.ndarray, at: np.ndarray) -> np.ndarray:
-    each = np.arange(len(bins))
-    node = np.zeros(len(bins), np.int64)
-    for _ in range(DEPTH):
-        node = 2 * node + 1 + (bins[each, feature[node]] >= at[node])
-    return node - (2**DEPTH - 1)
+    """The leaf (n,) int32 of each sample, in a complete tree. bins (n, F) uint8, C order."""
+    out = np.empty(len(bins), np.int32)
+    feature, at = np.ascontiguousarray(feature), np.ascontiguousarray(at)
+    _library().trees_leaves(bins.ctypes.data, bins.shape[1], len(bins), feature.ctypes.data, at.ctypes.data, DEPTH, out.ctypes.data)
+    return out
 
 
-def _tree(bins: np.ndarray, gradient: np.ndarray, second: np.ndarray, columns: np.ndarray
+def _tree(bins: np.ndarray, some: np.ndarray, gradient: np.ndarray, second: np.ndarray, columns: np.ndarray
           ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A tree on binned samples. gradient, second: whole numbers as float64; columns: features that it may use."""
+    """A tree on some binned samples. gradient, second: int64 of these; columns: int32, features that it may use."""
     feature, at = np.zeros(2**DEPTH - 1, np.uint8), np.full(2**DEPTH - 1, 255, np.uint8)
-    node = np.zeros(len(bins), np.int64)  # within its level
-    for level in range(DEPTH):
+    node = np.zeros(len(some), np.int32)  # within its level
+    for level in range(DEPTH + 1):
         wide = 2**level
-        best = np.zeros(wide)
-        for f in columns:
-            cell = node * BINS + bins[:, f]
-            g = np.bincount(cell, gradient, wide * BINS).reshape(wide, BINS)
-            h = np.bincount(cell, second, wide * BINS).reshape(wide, BINS)
-            left_g, left_h = np.cumsum(g, axis=1)[:, :-1], np.cumsum(h, axis=1)[:, :-1]
-            all_g, all_h = g.sum(axis=1)[:, None], h.sum(axis=1)[:, None]
-            right_g, right_h = all_g - left_g, all_h - left_h
-            gain = left_g**2 / (left_h + DAMPED * ONE) + right_g**2 / (right_h + DAMPED * ONE) - all_g**2 / (all_h + DAMPED * ONE)
-            gain[(left_h < LEAST * ONE / 4) | (right_h < LEAST * ONE / 4)] = 0.0
-            which = gain.argmax(axis=1)
-            most = gain[np.arange(wide), which]
-            better = most > best
-            first = wide - 1
-            feature[first : first + wide][better], at[first : first + wide][better] = f, which[better] + 1
-            best = np.where(better, most, best)
-        first = wide - 1
-        node = 2 * node + (bins[np.arange(len(bins)), feature[first + node]] >= at[first + node])
-    g = np.bincount(node, gradient, 2**DEPTH)
-    h = np.bincount(node, second, 2**DEPTH)
+        sums = np.zeros((len(columns) if level < DEPTH else 1, wide, BINS, 2), np.int64)
+        _library().trees_sums(bins.ctypes.data, bins.shape[1], some.ctypes.data, len(some), columns.ctypes.data, len(sums),
+                              node.ctypes.data, wide, BINS, gradient.ctypes.data, second.ctypes.data, sums.ctypes.data)
+        if level == DEPTH:
+            break
+        below = np.cumsum(sums, axis=2).astype(np.float64)
+        (left_g, left_h), (all_g, all_h) = (np.moveaxis(x, -1, 0) for x in (below[:, :, :-1], below[:, :, -1:]))
+        right_g, right_h = all_g - left_g, all_h - left_h
+        gain = left_g**2 / (left_h + DAMPED * ONE) + right_g**2 / (right_h + DAMPED * ONE) - all_g**2 / (all_h + DAMPED * ONE)
+        gain[(left_h < LEAST * ONE / 4) | (right_h < LEAST * ONE / 4)] = 0.0
+        flat = np.moveaxis(gain, 1, 0).reshape(wide, -1)  # of equal ones the first column and bin count
+        which, first = flat.argmax(axis=1), wide - 1
+        parts = flat[np.arange(wide), which] > 0.0
+        feature[first : first + wide][parts] = columns[which[parts] // (BINS - 1)]
+        at[first : first + wide][parts] = which[parts] % (BINS - 1) + 1
+        node = (2 * node + (bins[some, feature[first + node]] >= at[first + node])).astype(np.int32)
+    g, h = np.moveaxis(sums[0].sum(axis=1).astype(np.float64), -1, 0)
     leaf = np.rint(UNIT * RATE * g / (h + DAMPED * ONE)).astype(np.int16)
     return feature, at, leaf
 
 
-def train(values: np.ndarray, right: np.ndarray, weight: np.ndarray, trees: int, seed: int = 1, share: float = 0.3,
-          columns: float = 0.6) -> Forest:
+def train(values: np.ndarray, right: np.ndarray, weight: np.ndarray, trees: int, seed: int = 1, share: float = 0.2,
+          columns: float = 0.5) -> Forest:
     """values (n, F) float32, right (n,) bool, weight (n,) small whole numbers. Each tree sees a share of the samples and of the
     features. An empty node keeps bin 255, so that all its samples go left."""
     random = np.random.default_rng(seed)
-    edges = thresholds(values)
+    edges = thresholds(values[:: max(1, len(values) // QUANTILES)])
     bins = binned(values, edges)
     score = np.zeros(len(bins), np.int32)
     found = []
     for _ in range(trees):
-        some = np.flatnonzero(random.random(len(bins)) < share)
-        mine = np.sort(random.permutation(bins.shape[1])[: max(1, math.ceil(columns * bins.shape[1]))])
+        some = np.flatnonzero(random.random(len(bins)) < share).astype(np.int64)
+        mine = np.sort(random.permutation(bins.shape[1])[: max(1, math.ceil(columns * bins.shape[1]))]).astype(np.int32)
         entry = np.clip(score[some] // STEP + WIDEST * UNIT // STEP, 0, len(SIGMOID) - 1)
         p = SIGMOID[entry]
         w = weight[some].astype(np.int64)
-        gradient = w * (right[some] * ONE - p)
-        second = w * (p * (ONE - p) // ONE)
-        tree = _tree(bins[some], gradient.astype(np.float64), second.astype(np.float64), mine)
+        tree = _tree(bins, some, w * (right[some] * ONE - p), w * (p * (ONE - p) // ONE), mine)
         found.append(tree)
         score += tree[2][leaves_of(bins, tree[0], tree[1])]
     return Forest(edges, *(np.stack(part) for part in zip(*found)))

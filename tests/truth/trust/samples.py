@@ -13,7 +13,7 @@ from ..scans import campaigns, exact
 from ..scans.scanner import CAUSES
 from . import features as plain
 
-RIGHT, WRONG = 60_000, 30_000  # samples a scene, at most
+RIGHT, WRONG = 40_000, 20_000  # samples a scene, at most
 GROUPS = 3  # of scenes that are trained on in turns
 KINDS = ("mixed", "noise", "mirrored", "stray", "rain", "passer")
 
@@ -45,7 +45,7 @@ def chosen(wrong: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def read(folder: Path, name: str, count: int, wanted: int) -> np.ndarray:
     """NAME.f32 of a folder: (count, wanted) float32, a row a point in the order of the scan."""
-    values = np.fromfile(folder / f"{name}.f32", np.float32)
+    values = np.memmap(folder / f"{name}.f32", np.float32, "r")
     if values.size != count * wanted:
         raise ValueError(f"{folder / name}.f32 has {values.size} numbers; {count} points with {wanted} features need "
                          f"{count * wanted}")
