@@ -30,13 +30,10 @@ struct block {
 };
 
 static struct {
-    struct pt_once made;
-    struct pt_mutex lock; // of who adds
+    atomic_flag adding; // one at a time, for a moment
     struct block first;
     _Atomic uint64_t losses;
 } guard;
-
-static void make_lock(void) { pt_mutex_init(&guard.lock); }
 
 static struct entry *entry_of(uintptr_t address)
 {
@@ -68,8 +65,8 @@ static struct entry *free_entry(void)
 
 int pt_guard_add(void *pages, size_t size, int written)
 {
-    pt_once(&guard.made, make_lock);
-    pt_mutex_lock(&guard.lock);
+    while (atomic_flag_test_and_set(&guard.adding))
+        ;
     struct entry *entry = free_entry();
     if (entry) {
         atomic_store(&entry->count, 0);
@@ -78,7 +75,7 @@ int pt_guard_add(void *pages, size_t size, int written)
         atomic_store(&entry->size, size);
         atomic_store(&entry->begin, (uintptr_t)pages);
     }
-    pt_mutex_unlock(&guard.lock);
+    atomic_flag_clear(&guard.adding);
     return entry ? 0 : ENOMEM;
 }
 
@@ -88,8 +85,6 @@ void pt_guard_remove(void *pages)
     if (entry && atomic_load(&entry->begin) == (uintptr_t)pages)
         atomic_store(&entry->begin, 0);
 }
-
-int pt_guard_has(uintptr_t address) { return entry_of(address) != NULL; }
 
 static int lies_in(const struct entry *entry, uintptr_t first, uintptr_t end)
 {
@@ -101,7 +96,7 @@ static int lies_in(const struct entry *entry, uintptr_t first, uintptr_t end)
 }
 
 // Where there are too many ranges, the last one grows over what lies between: more is lost than need be.
-static int replace(struct entry *entry, uintptr_t address)
+static int replace(struct entry *entry, uintptr_t address, const struct pt_guard_system *system)
 {
     const uintptr_t begin = atomic_load(&entry->begin);
     const size_t size = atomic_load(&entry->size);
@@ -118,23 +113,24 @@ static int replace(struct entry *entry, uintptr_t address)
         first = before < first ? before : first;
         end = behind > end ? behind : end;
     }
-    pt_guard_widen(begin, size, &first, &end);
+    system->widen(begin, size, &first, &end);
     atomic_store(&lost->first, first); // before zeros are there: who has read some finds that they are
     atomic_store(&lost->end, end);
     atomic_store(&entry->count, place + 1);
     atomic_store(&entry->faults, faults + 1);
     atomic_fetch_add(&guard.losses, 1);
-    return pt_guard_replace(first, end - first, atomic_load(&entry->written));
+    return system->replace(first, end - first, atomic_load(&entry->written));
 }
 
-int pt_guard_fault(uintptr_t address)
+int pt_guard_fault(uintptr_t address, const struct pt_guard_system *system)
 {
     struct entry *entry = entry_of(address);
     if (!entry)
         return 0;
     while (atomic_flag_test_and_set(&entry->busy)) // another handler, which calls nothing that could wait
         ;
-    const int done = lies_in(entry, address, address + 1) || replace(entry, address); // another thread may have met it as well
+    const int done = lies_in(entry, address, address + 1) ||
+                     replace(entry, address, system); // another thread may have met it as well
     atomic_flag_clear(&entry->busy);
     return done;
 }

@@ -20,15 +20,16 @@ int pt_guard_add(void *pages, size_t size, int written);
 // Before it is unmapped. Pages that nobody watches are fine.
 void pt_guard_remove(void *pages);
 
+// By the platform. Both may run in a handler.
+struct pt_guard_system {
+    // Widens [*first, *end) to what can be replaced of a mapping.
+    void (*widen)(uintptr_t mapping, size_t mapping_size, uintptr_t *first, uintptr_t *end);
+    // Puts zeros in the place of such a range. Returns 0 where that failed.
+    int (*replace)(uintptr_t first, size_t size, int written);
+};
+
 // Called by the handler of a thread that could not read or write `address`. Returns 1: zeros are there now. 0: it is no page of ours.
 // Allocates nothing, takes no lock that a thread outside of a handler holds.
-int pt_guard_fault(uintptr_t address);
-// Whether an address lies in a mapping that is watched. For handlers.
-int pt_guard_has(uintptr_t address);
-
-// By the platform: widens [*first, *end) to what it can replace of a mapping, and puts zeros in the place of such a range. Returns 0 where
-// that failed. Safe in a handler.
-void pt_guard_widen(uintptr_t mapping, size_t mapping_size, uintptr_t *first, uintptr_t *end);
-int pt_guard_replace(uintptr_t first, size_t size, int written);
+int pt_guard_fault(uintptr_t address, const struct pt_guard_system *system);
 
 #endif

@@ -265,17 +265,19 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
 
 static struct sigaction former; // the host's
 
-void pt_guard_widen(uintptr_t mapping, size_t mapping_size, uintptr_t *first, uintptr_t *end)
+static void widen(uintptr_t mapping, size_t mapping_size, uintptr_t *first, uintptr_t *end)
 {
     (void)mapping, (void)mapping_size, (void)first, (void)end; // they are whole pages
 }
 
 // mmap is a system call and nothing more on these systems, so a handler may use it.
-int pt_guard_replace(uintptr_t first, size_t size, int written)
+static int replace(uintptr_t first, size_t size, int written)
 {
     return mmap((void *)first, whole_pages(size), PROT_READ | (written ? PROT_WRITE : 0),
                 MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED, -1, 0) != MAP_FAILED;
 }
+
+static const struct pt_guard_system guarding = {widen, replace};
 
 enum { PASSED_ON = 0x50a7 }; // si_errno of a fault that we handed on; the system leaves it 0
 
@@ -305,7 +307,7 @@ static void pass_on(int signal, siginfo_t *info, void *context)
 static void on_fault(int signal, siginfo_t *info, void *context)
 {
     const int error = errno;
-    if (info->si_code <= 0 || !pt_guard_fault((uintptr_t)info->si_addr)) // 0 and below: another process sent it
+    if (info->si_code <= 0 || !pt_guard_fault((uintptr_t)info->si_addr, &guarding)) // 0 and below: another process sent it
         pass_on(signal, info, context);
     errno = error;
 }

@@ -337,7 +337,7 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
 // ---- pages that cannot be read -------------------------------------------------------------------------------------------
 
 // A view cannot be replaced in part.
-void pt_guard_widen(uintptr_t mapping, size_t mapping_size, uintptr_t *first, uintptr_t *end)
+static void widen(uintptr_t mapping, size_t mapping_size, uintptr_t *first, uintptr_t *end)
 {
     *first = mapping;
     *end = mapping + mapping_size;
@@ -345,11 +345,13 @@ void pt_guard_widen(uintptr_t mapping, size_t mapping_size, uintptr_t *first, ui
 
 // It becomes reserved memory, whose pages are zeros when they are first read (on_fault). Threads that read it in between wait in their own
 // handler.
-int pt_guard_replace(uintptr_t first, size_t size, int written)
+static int replace(uintptr_t first, size_t size, int written)
 {
     (void)written;
     return UnmapViewOfFile((void *)first) && VirtualAlloc((void *)first, size, MEM_RESERVE, PAGE_READWRITE) == (void *)first;
 }
+
+static const struct pt_guard_system guarding = {widen, replace};
 
 static LONG CALLBACK on_fault(EXCEPTION_POINTERS *exception)
 {
@@ -361,7 +363,8 @@ static LONG CALLBACK on_fault(EXCEPTION_POINTERS *exception)
     const int writes = record->ExceptionInformation[0] == 1;
     if (record->ExceptionCode == EXCEPTION_ACCESS_VIOLATION && writes && !pt_pages_lost(address, 1))
         return EXCEPTION_CONTINUE_SEARCH; // a fault of the program's own
-    return pt_guard_fault((uintptr_t)address) && VirtualAlloc((void *)(uintptr_t)address, 1, MEM_COMMIT, PAGE_READWRITE)
+    return pt_guard_fault((uintptr_t)address, &guarding) &&
+                   VirtualAlloc((void *)(uintptr_t)address, 1, MEM_COMMIT, PAGE_READWRITE)
                ? EXCEPTION_CONTINUE_EXECUTION
                : EXCEPTION_CONTINUE_SEARCH;
 }
