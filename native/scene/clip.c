@@ -48,14 +48,14 @@ int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8])
     const patina_cloud_style *style = &instance->style;
     uint32_t any = 0;
     memset(hidden, 0, 8 * sizeof *hidden);
-    const int asked = style->hidden_kinds || style->least_certainty > 0.0f || style->free_space == PATINA_FREE_SPACE_USE;
+    const int asked = style->hidden_kinds || style->least_trust > 0.0f || style->free_space == PATINA_FREE_SPACE_USE;
     if (!asked || !instance->cloud->info.has_shapes)
         return 0;
     for (uint32_t sight = 0; sight < 256; sight++) {
         const uint32_t word = sight << PT_SHAPE_SIGHT_SHIFT;
-        const float certainty = (float)(word >> PT_SHAPE_CERTAINTY_SHIFT & 15u) / 15.0f;
+        const float trust = (float)(word >> PT_SHAPE_TRUST_SHIFT & 15u) / 15.0f;
         const uint32_t out = (style->hidden_kinds >> (word >> PT_SHAPE_KIND_SHIFT & 7u) & 1u) |
-                             (certainty < style->least_certainty) |
+                             (trust < style->least_trust) |
                              (style->free_space == PATINA_FREE_SPACE_USE && (word & PT_SHAPE_SEEN_THROUGH));
         hidden[sight / 32] |= out << sight % 32;
         any |= out;
