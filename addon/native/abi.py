@@ -184,7 +184,8 @@ class FrameStats(Descriptor):
                 ("shadow_samples", c_uint32), ("shadow_error", c_float), ("chunks_clipped", c_uint64),
                 ("chunks_cut", c_uint64), ("pixel_samples", c_uint32), ("pixel_pending", c_uint32),
                 ("pixel_error", c_float), ("mapped_bytes", c_uint64), ("mapped_cap", c_uint64), ("mapped_held", c_uint64),
-                ("mapped_read", c_uint64), ("mapped_rounds", c_uint32), ("mapped_returned", c_uint32)]
+                ("mapped_read", c_uint64), ("mapped_rounds", c_uint32), ("mapped_returned", c_uint32),
+                ("untrusted", c_uint64)]
 
 
 class Panorama(Descriptor):

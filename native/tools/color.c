@@ -90,6 +90,14 @@ static int parse_tint(const char *text, struct tool_color *color)
     return 0;
 }
 
+// 0 draws all points: below 0 in a style, whose 0 is the default.
+static int parse_trust(const char *value, struct tool_color *color)
+{
+    const int bad = parse_between(value, 0, 1, &color->least_trust);
+    color->least_trust = color->least_trust > 0 ? color->least_trust : -1;
+    return bad;
+}
+
 int tool_parse_color(const char *name, const char *value, struct tool_color *color)
 {
     double n[3];
@@ -115,7 +123,7 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
     if (!strcmp(name, "--hide-kinds"))
         return parse_kinds(value, &color->hidden_kinds);
     if (!strcmp(name, "--trust"))
-        return parse_between(value, 0, 1, &color->least_trust);
+        return parse_trust(value, color);
     if (!strcmp(name, "--free-space")) {
         static const char *const words[] = {"off", "show", "use"};
         for (color->free_space = 0; color->free_space < 3; color->free_space++)

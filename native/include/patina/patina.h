@@ -245,7 +245,7 @@ enum patina_kind {
 // Numbers of patina_analysis_desc.trust_features: scene/trust_features.h lists them.
 #define PATINA_TRUST_FEATURES 33
 // The least trust of points that are drawn by default: at most 1 % of the right samples of any scene for tuning have less.
-#define PATINA_TRUST_DEFAULT 0.96f
+#define PATINA_TRUST_DEFAULT 0.78f
 
 typedef struct patina_analysis_desc {
     size_t struct_size;
@@ -703,6 +703,7 @@ typedef struct patina_frame_stats {
     uint64_t mapped_read;     // by passes over points, each counted; what pixels ask of single points comes to it
     uint32_t mapped_rounds;   // of the pass over points that took most; 0 where nothing is mapped
     uint32_t mapped_returned; // how often all that was held was given back
+    uint64_t untrusted; // points of the scene that are left out for their trust: patina_cloud_style.least_trust
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
