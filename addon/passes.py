@@ -130,7 +130,7 @@ PASSES = (
                lambda layer: layer.use_pass_object_index, _object_index),
     RenderPass("Source", 1, "X", 'VALUE', "SOURCE", lambda layer: layer.patina.use_pass_source),
     RenderPass("Line", 1, "X", 'VALUE', "LINE", lambda layer: layer.patina.use_pass_line),
-    RenderPass("Certainty", 1, "X", 'VALUE', "CERTAINTY", lambda layer: layer.patina.use_pass_certainty),
+    RenderPass("Trust", 1, "X", 'VALUE', "TRUST", lambda layer: layer.patina.use_pass_trust),
     RenderPass("Thickness", 1, "X", 'VALUE', "THICKNESS", lambda layer: layer.patina.use_pass_thickness),
     RenderPass("Density", 1, "X", 'VALUE', "DENSITY", lambda layer: layer.patina.use_pass_density),
     RenderPass("Disagreement", 1, "X", 'VALUE', "DISAGREEMENT", lambda layer: layer.patina.use_pass_disagreement),

@@ -70,7 +70,7 @@
 // Euclidean distance of the source pass: the root of an exact integer, drivers' sqrt() within 3 ulp; share.
 #define TOL_DISTANCE (8.0 * TOL_UNIT)
 
-// Certainty: n times the rounded 1 / 15; thickness: one product. Share.
+// Trust: n times the rounded 1 / 15; thickness: one product. Share.
 #define TOL_KNOWN (2.0 * TOL_UNIT)
 
 // Where a station looked through: place on a face, as a share of its edge, and squares of ranges, after a sum of four terms that

@@ -11,12 +11,13 @@ from typing import Any
 VERSION = (0, 1)  # of the header; the patch number may differ
 
 SIDES_VOTED = 2
+TRUST_FEATURES = 33
 MAX_RAMP = 256
 MAX_LAYERS = 16
 
 # patina_pass: name → (number, channels)
 PASSES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1), "LINE": (5, 1),
-          "CERTAINTY": (6, 1), "THICKNESS": (7, 1), "DENSITY": (8, 1), "DISAGREEMENT": (9, 1)}
+          "TRUST": (6, 1), "THICKNESS": (7, 1), "DENSITY": (8, 1), "DISAGREEMENT": (9, 1)}
 
 ERROR = {"OK": 0, "ERROR_ARGUMENT": -1, "ERROR_MEMORY": -2, "ERROR_FILE": -3, "ERROR_FORMAT": -4, "ERROR_UNSUPPORTED": -5,
          "ERROR_DEVICE": -6, "ERROR_CANCELLED": -7, "ERROR_TOO_MANY_POINTS": -8, "ERROR_EMPTY": -9, "ERROR_INTERNAL": -10}
@@ -88,19 +89,19 @@ class CloudInfo(Descriptor):
                 ("has_classes", c_uint32), ("scalar_range", c_float * 2), ("class_bits", c_uint32 * 8),
                 ("has_shapes", c_uint32), ("normals_oriented", c_uint32), ("estimated_normals", c_uint64),
                 ("kinds", c_uint64 * 6), ("seen_through", c_uint64), ("packed", c_uint32), ("numbered", c_uint32),
-                ("packed_error", c_double)]
+                ("packed_error", c_double), ("trusts", c_uint64 * 16)]
 
 
 class AnalysisDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("neighbours", c_uint32), ("threads", c_uint32), ("keep_normals", c_uint32),
                 ("station_count", c_uint32), ("stations", c_void_p), ("station", Array), ("free_space", c_uint32),
                 ("row", Array), ("column", Array), ("grid", c_uint32), ("scan", Array), ("direction_count", c_uint32),
-                ("directions", c_void_p)]
+                ("directions", c_void_p), ("trust_features", c_void_p)]
 
 
 class Neighbourhoods(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("normal", c_void_p), ("axis", c_void_p), ("spacing", c_void_p),
-                ("half_axes", c_void_p), ("sigma", c_void_p), ("kind", c_void_p), ("certainty", c_void_p),
+                ("half_axes", c_void_p), ("sigma", c_void_p), ("kind", c_void_p), ("trust", c_void_p),
                 ("seen_through", c_void_p), ("neighbours", c_uint32), ("threads", c_uint32), ("numbers", c_void_p),
                 ("distances", c_void_p), ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
 
@@ -112,7 +113,7 @@ class CloudStyle(Descriptor):
                 ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p),
                 ("ramp_count", c_uint32), ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
                 ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
-                ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float), ("mask", c_void_p),
+                ("hidden_kinds", c_uint32), ("least_trust", c_float), ("largest_gap", c_float), ("mask", c_void_p),
                 ("grade", c_void_p), ("exact", c_uint32), ("was_padding", c_uint32), ("soft", c_uint32),
                 ("soft_model", c_uint32), ("soft_shells", c_uint32), ("soft_radius", c_float), ("soft_opacity", c_float),
                 ("soft_modulation", c_float), ("field", c_void_p), ("soft_threshold", c_float), ("soft_unused", c_float),
@@ -184,7 +185,7 @@ class FrameStats(Descriptor):
                 ("chunks_cut", c_uint64), ("pixel_samples", c_uint32), ("pixel_pending", c_uint32),
                 ("pixel_error", c_float), ("mapped_bytes", c_uint64), ("mapped_cap", c_uint64), ("mapped_held", c_uint64),
                 ("mapped_read", c_uint64), ("mapped_rounds", c_uint32), ("mapped_returned", c_uint32),
-                ("points_lost", c_uint64)]
+                ("points_lost", c_uint64), ("untrusted", c_uint64)]
 
 
 class Panorama(Descriptor):

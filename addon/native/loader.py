@@ -23,7 +23,7 @@ MEMORY, FILE, FORMAT, CANCELLED, TOO_MANY_POINTS, INTERNAL = (
 
 # Arrays of patina_neighbourhoods: type and width, 0: one number a point, -1: as many as neighbours.
 NEIGHBOURHOODS = {"normal": (np.float32, 3), "axis": (np.float32, 3), "spacing": (np.float32, 0), "half_axes": (np.float32, 2),
-                  "sigma": (np.float32, 0), "kind": (np.uint8, 0), "certainty": (np.float32, 0), "seen_through": (np.uint8, 0), "numbers": (np.uint32, -1),
+                  "sigma": (np.float32, 0), "kind": (np.uint8, 0), "trust": (np.float32, 0), "seen_through": (np.uint8, 0), "numbers": (np.uint32, -1),
                   "distances": (np.float64, -1), "soft_radius": (np.float32, 0), "uncertainty": (np.float32, 0)}
 
 TYPES = {name.lower(): value for name, value in abi.TYPE.items()}  # patina_type by numpy's name

@@ -18,7 +18,7 @@ from .steps import Stepped
 
 # attribute → its type, the key of an element's values
 WRITTEN = {NORMAL_NAME: ('FLOAT_VECTOR', "vector"), "spacing": ('FLOAT', "value"), "radius": ('FLOAT', "value"),
-           "thickness": ('FLOAT', "value"), "kind": ('INT8', "value"), "certainty": ('FLOAT', "value")}
+           "thickness": ('FLOAT', "value"), "kind": ('INT8', "value"), "trust": ('FLOAT', "value")}
 SOFT = {name: ('FLOAT', "value") for name in ("soft_radius", "uncertainty", "density")}
 
 NEAREST = 1e-4  # of how far a 3D view reaches, where it begins
@@ -31,7 +31,7 @@ _boxes: OrderedDict[tuple[int, ...], Box | None] = OrderedDict()  # without stra
 
 class PATINA_OT_analyze(Stepped, Operator):
     """Find out from the neighbors of each point how the surface lies there, and keep it in attributes: normal, spacing, \
-radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and certainty"""
+radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and trust"""
 
     bl_idname = "object.patina_analyze"
     bl_label = "Analyze"
@@ -87,7 +87,7 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
         except native.PatinaError as error:
             self.report({'ERROR'}, f"Patina: {error}")
             return {'CANCELLED'}
-        found = cloud.neighbourhoods("normal", "spacing", "half_axes", "sigma", "kind", "certainty")
+        found = cloud.neighbourhoods("normal", "spacing", "half_axes", "sigma", "kind", "trust")
         found["half_axes"] = np.ascontiguousarray(found["half_axes"][:, 0])
         for name, values in zip(WRITTEN, found.values(), strict=True):
             _write(data, name, values)

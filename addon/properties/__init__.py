@@ -284,8 +284,8 @@ class PatinaObjectProperties(PropertyGroup):
     hide_unclassified: BoolProperty(
         name="Unclassified", override=_OVERRIDE, default=False,
         description="Points of the classes 0, never classified, and 1, unassigned, are not drawn and cast no shadow")
-    least_certainty: FloatProperty(
-        name="Least Certainty", override=_OVERRIDE, default=0.0, min=0.0, max=1.0, subtype='FACTOR',
+    least_trust: FloatProperty(
+        name="Trust", override=_OVERRIDE, default=0.0, min=0.0, max=1.0, subtype='FACTOR',
         description="Points whose neighbors leave more doubt about what they are part of are not drawn and cast no shadow")
     opacity: FloatProperty(
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
@@ -355,8 +355,8 @@ class PatinaViewLayerProperties(PropertyGroup):
     use_pass_line: BoolProperty(
         name="Line", default=False, update=_update_passes, override=_OVERRIDE,
         description="Share of each pixel that a line covers, of the nearest layer; without lines 0")
-    use_pass_certainty: BoolProperty(
-        name="Certainty", default=False, update=_update_passes, override=_OVERRIDE,
+    use_pass_trust: BoolProperty(
+        name="Trust", default=False, update=_update_passes, override=_OVERRIDE,
         description="How well what each point is taken for explains its neighbors, 0 to 1, of the nearest point; "
                     "0 where nothing is, or the points were not analyzed")
     use_pass_thickness: BoolProperty(

@@ -83,7 +83,7 @@ class CloudStyle:
     largest_gap: float = 0.0
     free_space: int = 0
     hidden_kinds: int = 0
-    least_certainty: float = 0.0
+    least_trust: float = 0.0
     exact: int = 1  # black is black
     surface: int = 0  # as the settings; else PATINA_SURFACE_RANGES
     range_gamma: float = 0.0
@@ -653,7 +653,7 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         largest_gap=patina.largest_gap,
         free_space=enum_number(patina, "free_space"),
         hidden_kinds=int(patina.hide_stray) << native.KINDS.index("STRAY"),
-        least_certainty=patina.least_certainty,
+        least_trust=patina.least_trust,
         **ranges.style_fields(obj), **colors.style_fields(obj))
 
 

@@ -32,10 +32,10 @@ def spare_analysis(obj: bpy.types.Object, surface: str, layer: bpy.types.ViewLay
     """Whether an object is drawn as range images, and nothing else asks for what an analysis finds: it may have one, and its picture is
     the same. surface: of the scene."""
     patina = obj.patina
-    asked = (patina.analysis == 'ALWAYS' or patina.soft.use or patina.cull_back or patina.hide_stray or patina.least_certainty > 0.0
+    asked = (patina.analysis == 'ALWAYS' or patina.soft.use or patina.cull_back or patina.hide_stray or patina.least_trust > 0.0
              or patina.free_space != 'OFF')
     return ((patina.ranges.use or surface == 'RANGES') and not asked
-            and not (layer.patina.use_pass_certainty or layer.patina.use_pass_thickness))
+            and not (layer.patina.use_pass_trust or layer.patina.use_pass_thickness))
 
 
 def told_of(obj: bpy.types.Object, surface: str) -> str:

@@ -164,7 +164,7 @@ class PATINA_PT_passes(PatinaPanel, Panel):
         column.prop(layer, "use_pass_object_index")
         column.prop(layer.patina, "use_pass_source")
         column.prop(layer.patina, "use_pass_line")
-        column.prop(layer.patina, "use_pass_certainty")
+        column.prop(layer.patina, "use_pass_trust")
         column.prop(layer.patina, "use_pass_thickness")
         column.prop(layer.patina, "use_pass_density")
         column.prop(layer.patina, "use_pass_disagreement")
@@ -260,7 +260,7 @@ class PATINA_PT_hidden(_PatinaObjectPanel, Panel):
         column.prop(patina, "hide_unclassified")
         column = layout.column()
         column.active = patina.analysis != 'OFF'
-        column.prop(patina, "least_certainty")
+        column.prop(patina, "least_trust")
         column.prop(patina, "free_space")
 
 

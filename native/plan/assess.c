@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The passes of what an analysis knows of the points that a picture shows: certainty and thickness.
+// The passes of what an analysis knows of the points that a picture shows: trust and thickness.
 #include "passes.h"
 #include "shared/picture.h"
 
@@ -20,12 +20,12 @@ static int part_of_crop(const struct pt_plan *plan, const struct pt_plan_instanc
 void pt_plan_assess(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    const uint32_t asked = builder->scene->settings.passes & (1u << PATINA_PASS_CERTAINTY | 1u << PATINA_PASS_THICKNESS);
+    const uint32_t asked = builder->scene->settings.passes & (1u << PATINA_PASS_TRUST | 1u << PATINA_PASS_THICKNESS);
     struct assess_args args = {.crop_x = plan->crop[0],
                                .crop_y = plan->crop[1],
                                .crop_width = plan->crop[2],
                                .first = 1,
-                               .certainty = asked >> PATINA_PASS_CERTAINTY & 1u,
+                               .trust = asked >> PATINA_PASS_TRUST & 1u,
                                .thickness = asked >> PATINA_PASS_THICKNESS & 1u};
     for (uint32_t i = 0; i < plan->instance_count && asked; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
@@ -40,13 +40,13 @@ void pt_plan_assess(struct pt_builder *builder)
         args.instance = instance->args;
         PT_REASON(PT_ADD(builder, assess, args,
                          {pt_plane_at(PT_PLANE_KEYS, 0), pt_shapes_of(instance, i),
-                          pt_plane_if(args.certainty != 0, PT_PLANE_CERTAINTY, 0),
+                          pt_plane_if(args.trust != 0, PT_PLANE_TRUST, 0),
                           pt_plane_if(args.thickness != 0, PT_PLANE_THICKNESS, 0)}),
-                  "of instance %u are asked for:%s%s", i, args.certainty ? " certainty" : "",
+                  "of instance %u are asked for:%s%s", i, args.trust ? " trust" : "",
                   args.thickness ? " thickness" : "");
         args.first = 0;
         plan->assessed |= asked;
     }
     if (args.first)
-        pt_skip(builder, "assess", asked ? "no cloud in view was analysed" : "neither certainty nor thickness is asked for");
+        pt_skip(builder, "assess", asked ? "no cloud in view was analysed" : "neither trust nor thickness is asked for");
 }

@@ -224,7 +224,7 @@ static inline float pt_veil_deep(const struct pt_plan *plan)
     return deep > 1e-30f ? deep : 1e-30f;
 }
 
-// assess.c: certainty and thickness of what the picture shows.
+// assess.c: trust and thickness of what the picture shows.
 void pt_plan_assess(struct pt_builder *builder);
 
 // reopen.c: what was closed where stations looked through. Of pictures of one layer, not of light maps.

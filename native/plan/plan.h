@@ -80,7 +80,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(SOFT_BINS, bins, BINS, ONE, 0)                                                                                           \
     X(SOFT_REACHED, f32, WINDOW, ONE, 0)                                                                                       \
     X(VEIL, f32, VEILS, ONE, 0)                                                                                                \
-    X(CERTAINTY, f32, CROP, ONE, 0)                                                                                            \
+    X(TRUST, f32, CROP, ONE, 0)                                                                                            \
     X(THICKNESS, f32, CROP, ONE, 0)                                                                                            \
     X(DENSITY, f32, CROP, ONE, 0)                                                                                              \
     X(DISAGREEMENT, f32, CROP, ONE, 0)                                                                                         \
@@ -386,7 +386,7 @@ struct pt_plan {
     float line_radius; // of the widest line, pixels; 0: none
     uint32_t reopens;  // how often points are drawn where closed pixels are taken back: 2; 0: none are
     uint32_t
-        assessed; // of PATINA_PASS_CERTAINTY, _THICKNESS, _DENSITY, _DISAGREEMENT, bits 1 << those that are asked for and known of something
+        assessed; // of PATINA_PASS_TRUST, _THICKNESS, _DENSITY, _DISAGREEMENT, bits 1 << those that are asked for and known of something
     uint64_t mapped_cap,
         round_bytes; // of what is held of clouds in files, and read of them at a time (rounds.h); 0: all there is
     int copied;      // by a device that copies clouds: then of them all, in ranges (slots.h)

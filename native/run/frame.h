@@ -18,7 +18,7 @@ struct pt_shown {
     uint32_t soft_parts, soft_records; // of soft points; in the largest part
     uint64_t peak;                     // bytes of planes that the plan came to, those of light maps apart
     uint32_t passes;                   // bits of what was rendered
-    uint32_t assessed;                 // passes of certainty, thickness, density that have planes, bits 1 << PATINA_PASS_*
+    uint32_t assessed;                 // passes of trust, thickness, density that have planes, bits 1 << PATINA_PASS_*
     uint32_t layer_most;               // that the settings allowed
     uint32_t layer_passes;             // bits of what was kept of each
     uint32_t crop[4], plane_width;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One picture of a frame: the scene is planned, the plan executed on the frame's planes, and what there is to be told of it kept.
 #include "frame.h"
+#include "scene/clip.h"
 
 #include "execute.h"
 #include "page_check.h"
@@ -33,6 +34,8 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                         .chunks_cut = plan->chunks_cut,
                                         .pixel_samples = 1,
                                         .ms = ms};
+    for (uint32_t i = 0; i < scene->cloud_count; i++)
+        shown->stats.untrusted += pt_untrusted(&scene->instances[i]);
     shown->peak = plan->peak;
     shown->soft_parts = plan->soft.part_count;
     shown->soft_records = plan->soft.records;

@@ -21,7 +21,7 @@ static const struct {
     [PATINA_PASS_SOURCE] = {PT_PLANE_SOURCE, 1, "SOURCE"},
     [PATINA_PASS_SHADOW] = {PT_PLANE_SHADOW, 1, "SHADOW"},
     [PATINA_PASS_LINE] = {PT_PLANE_LINES, 1, "LINE"},
-    [PATINA_PASS_CERTAINTY] = {PT_PLANE_CERTAINTY, 1, "CERTAINTY"},
+    [PATINA_PASS_TRUST] = {PT_PLANE_TRUST, 1, "TRUST"},
     [PATINA_PASS_THICKNESS] = {PT_PLANE_THICKNESS, 1, "THICKNESS"},
     [PATINA_PASS_DENSITY] = {PT_PLANE_DENSITY, 1, "DENSITY"},
     [PATINA_PASS_DISAGREEMENT] = {PT_PLANE_DISAGREEMENT, 1, "DISAGREEMENT"},
@@ -38,7 +38,7 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT,
                        "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu", pass_table[pass].name,
                        frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, expected, size);
-    const uint32_t known = 1u << PATINA_PASS_CERTAINTY | 1u << PATINA_PASS_THICKNESS | 1u << PATINA_PASS_DENSITY |
+    const uint32_t known = 1u << PATINA_PASS_TRUST | 1u << PATINA_PASS_THICKNESS | 1u << PATINA_PASS_DENSITY |
                            1u << PATINA_PASS_DISAGREEMENT;
     if ((pass == PATINA_PASS_SHADOW && frame->shown.all_lit) || (pass == PATINA_PASS_LINE && !frame->shown.has_lines) ||
         (known & ~frame->shown.assessed) >> pass & 1u) { // no plane

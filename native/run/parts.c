@@ -35,7 +35,7 @@ static uint64_t add_cloud(uint64_t hash, const struct pt_instance *instance)
     const struct patina_cloud *cloud = instance->cloud;
     const patina_cloud_style *style = &instance->style;
     const uint32_t words[] = {style->lighting, style->cull_back, style->shadow_off, style->clip_off, style->hidden_kinds};
-    const float numbers[] = {style->d_min, style->transparency, style->least_certainty};
+    const float numbers[] = {style->d_min, style->transparency, style->least_trust};
     hash = add_word(add_word(hash, cloud->info.count), cloud->slots);
     hash = add(hash, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
     hash = add(hash, style->world_from_object, sizeof style->world_from_object);

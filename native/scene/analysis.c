@@ -8,6 +8,7 @@
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "orient.h"
+#include "trust.h"
 #include "paged.h"
 #include "page_sums.h"
 #include "parts.h"
@@ -30,6 +31,7 @@ struct walk {
     struct pt_neighbours tree, coarse;
     struct pt_beams beams;
     struct pt_grids grids;
+    struct pt_trust trust;
     patina_progress *progress;
     uint32_t k;
     int rows;  // without stations: the cloud's samples lie in rows, far apart
@@ -55,13 +57,13 @@ static void sample_of(const struct pt_neighbours *tree, const struct pt_neighbou
 
 static uint64_t all_of(const struct pt_sample *sample) { return sample->count >= 64 ? ~0ull : (1ull << sample->count) - 1ull; }
 
-static void look_from_afar(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf,
+static void look_from_afar(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t lanes,
                            struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF])
 {
     struct pt_sample sample;
     struct pt_plane plane;
     uint32_t volume = 0;
-    for (uint32_t left = pt_leaf_lanes(tree, leaf); left; left &= left - 1) {
+    for (uint32_t left = lanes; left; left &= left - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(left);
         volume |= (uint32_t)(hoods[lane].kind == PT_KIND_VOLUME) << lane;
     }
@@ -77,10 +79,10 @@ static void look_from_afar(const struct pt_neighbours *tree, const struct pt_nei
     }
 }
 
-void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t k,
-                      struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context)
+void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t lanes,
+                      uint32_t k, struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context)
 {
-    const uint32_t lanes = pt_leaf_lanes(tree, leaf), wider = WIDER * k < PT_NEIGHBOURS_MOST ? WIDER * k : PT_NEIGHBOURS_MOST;
+    const uint32_t wider = WIDER * k < PT_NEIGHBOURS_MOST ? WIDER * k : PT_NEIGHBOURS_MOST;
     struct pt_plane planes[PT_LEAF], wide;
     struct pt_sample samples[PT_LEAF], narrow;
     uint32_t doubtful = 0;
@@ -115,7 +117,7 @@ void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbou
             pt_neighbourhood_of(&narrow, &planes[lane], &hoods[lane]);
         }
     }
-    look_from_afar(tree, coarse, leaf, found, hoods);
+    look_from_afar(tree, coarse, leaf, lanes, found, hoods);
     for (uint32_t left = lanes; left; left &= left - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(left);
         hoods[lane].sampled = hoods[lane].spacing;
@@ -164,16 +166,19 @@ static void limit_stray(const struct walk *walk, struct pt_neighbourhood *hood)
 }
 
 struct limited { // by a chunk's beams
-    const struct walk *walk;
+    struct walk *walk;
     uint32_t chunk;
+    int again; // without untrusted points
 };
 
 static void limit_point(void *context, uint32_t place, const struct pt_sample *sample, struct pt_neighbourhood *hood)
 {
-    const struct limited *limited = context;
+    struct limited *limited = context;
     const uint32_t slot = limited->walk->tree.slots[place];
     double p[3];
     const struct pt_beam *beam = beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk], slot, p);
+    if (!limited->again)
+        pt_trust_note(&limited->walk->trust, place, sample);
     if (pt_grids_describe(&limited->walk->grids, limited->walk->desc, slot, pt_number_of(limited->walk->cloud, slot), hood))
         return;
     if (beam)
@@ -199,7 +204,7 @@ static int lies_in_rows(const struct walk *walk)
     struct pt_neighbourhood hoods[PT_LEAF];
     uint64_t flat = 0, uneven = 0;
     for (uint32_t leaf = step / 2; leaf < leaves && !pt_progress_cancelled(walk->progress); leaf += step) {
-        pt_describe_leaf(&walk->tree, &walk->coarse, leaf, walk->k, &found, hoods, NULL, NULL);
+        pt_describe_leaf(&walk->tree, &walk->coarse, leaf, pt_leaf_lanes(&walk->tree, leaf), walk->k, &found, hoods, NULL, NULL);
         for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
             const struct pt_neighbourhood *hood = &hoods[__builtin_ctz(left)];
             flat += hood->kind == PT_KIND_SURFACE;
@@ -259,14 +264,16 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     (void)thread;
     for (uint32_t i = begin; i < end; i++) {
         const uint32_t c = walk->tree.chunk_order[i];
-        struct limited limited = {walk, c};
+        struct limited limited = {walk, c, 0};
         uint32_t known = 0;
         for (uint32_t leaf = walk->tree.chunk_leaf[c]; leaf < walk->tree.chunk_leaf[c + 1]; leaf++) {
             if (pt_progress_cancelled(walk->progress))
                 return;
-            pt_describe_leaf(&walk->tree, &walk->coarse, leaf, walk->k, &found, hoods, limit_point, &limited);
-            for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
+            const uint32_t lanes = pt_leaf_lanes(&walk->tree, leaf);
+            pt_describe_leaf(&walk->tree, &walk->coarse, leaf, lanes, walk->k, &found, hoods, limit_point, &limited);
+            for (uint32_t left = lanes; left; left &= left - 1) {
                 const uint32_t lane = (uint32_t)__builtin_ctz(left);
+                hoods[lane].trust = 1.0;
                 write_point(walk, c, walk->tree.slots[leaf * PT_LEAF + lane], &hoods[lane]);
                 if (hoods[lane].sampled > 0.0)
                     spacings[known++] = (float)hoods[lane].sampled;
@@ -275,8 +282,68 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         }
         finish_chunk(walk, &walk->out->chunks[c], spacings, known);
         uint32_t done = atomic_fetch_add_explicit(&walk->done, 1, memory_order_relaxed) + 1;
-        pt_progress_raise(walk->progress, 0.05 + 0.8 * done / walk->cloud->chunk_count);
+        pt_progress_raise(walk->progress, 0.05 + 0.55 * done / walk->cloud->chunk_count);
     }
+}
+
+// ---- without untrusted points ------------------------------------------------------------------------------------------------
+
+// The point's share of the tally, before it is described once more.
+static void forget_point(struct walk *walk, uint32_t chunk_index, uint32_t slot)
+{
+    const uint32_t given = walk->given ? walk->cloud->surfels[slot] & PT_NORMAL_BITS : PT_NORMAL_NONE;
+    struct tally *tally = &walk->tallies[chunk_index];
+    tally->kinds[walk->out->shapes[slot] >> PT_SHAPE_KIND_SHIFT & 7u]--;
+    tally->estimated -= (walk->out->surfels[slot] & PT_NORMAL_BITS) != given;
+}
+
+static void walk_touched(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct walk *walk = context;
+    struct pt_found found;
+    struct pt_neighbourhood hoods[PT_LEAF];
+    (void)thread;
+    for (uint32_t i = begin; i < end; i++) {
+        const uint32_t c = walk->tree.chunk_order[i];
+        struct limited limited = {walk, c, 1};
+        uint32_t touched = 0;
+        for (uint32_t leaf = walk->tree.chunk_leaf[c]; leaf < walk->tree.chunk_leaf[c + 1]; leaf++) {
+            if (pt_progress_cancelled(walk->progress))
+                return;
+            const uint32_t lanes = pt_trust_touched(&walk->trust, leaf);
+            touched |= lanes;
+            if (lanes)
+                pt_describe_leaf(&walk->tree, &walk->coarse, leaf, lanes, walk->k, &found, hoods, limit_point, &limited);
+            for (uint32_t left = lanes; left; left &= left - 1) {
+                const uint32_t lane = (uint32_t)__builtin_ctz(left), slot = walk->tree.slots[leaf * PT_LEAF + lane];
+                hoods[lane].trust = pt_trust_of_level(walk->out->shapes[slot] >> PT_SHAPE_TRUST_SHIFT & 15u);
+                forget_point(walk, c, slot);
+                write_point(walk, c, slot, &hoods[lane]);
+            }
+            pt_store_look(walk->store);
+        }
+        if (touched || walk->trust.hidden_first[c] != walk->trust.hidden_first[c + 1])
+            pt_trust_finish_chunk(&walk->trust, &walk->out->chunks[c], walk->out->surfels, walk->out->shapes);
+        const uint32_t done = atomic_fetch_add_explicit(&walk->done, 1, memory_order_relaxed) + 1;
+        pt_progress_raise(walk->progress, 0.75 + 0.1 * done / walk->cloud->chunk_count);
+    }
+}
+
+// Judges all points; those whose neighborhoods held untrusted ones are described again without these.
+static int judge(struct walk *walk, struct pt_pool *pool)
+{
+    pt_trust_judge(&walk->trust, pool);
+    if (pt_progress_cancelled(walk->progress))
+        return PATINA_ERROR_CANCELLED;
+    const int error = pt_trust_hide(&walk->trust);
+    if (!error && walk->trust.hidden_count && walk->trust.hidden_count == walk->cloud->info.drawn)
+        pt_log(PT_LOG_WARNING, "No point of the cloud is trusted, so all of them are drawn. It may hold strays alone.");
+    if (!error && walk->trust.hidden_count && walk->trust.hidden_count < walk->cloud->info.drawn) {
+        atomic_store(&walk->done, 0);
+        pt_parallel(pool, walk->cloud->chunk_count, 1, walk_touched, walk);
+    }
+    pt_trust_show(&walk->trust);
+    return error ? error : pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
 
 // ---- the cloud -------------------------------------------------------------------------------------------------------------
@@ -333,12 +400,14 @@ int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *des
     return error ? error : pt_free_space_check(desc);
 }
 
-static void gather_shapes(struct pt_chunk *chunk, const uint32_t *shapes)
+static void gather_shapes(struct pt_analysis *out, struct pt_chunk *chunk)
 {
+    const uint32_t *shapes = out->shapes + chunk->first;
     memset(chunk->shapes, 0, sizeof chunk->shapes);
     for (uint32_t i = 0; i < chunk->count; i++) {
         const uint32_t sight = shapes[i] >> PT_SHAPE_SIGHT_SHIFT & 255u;
         chunk->shapes[sight / 32] |= 1u << sight % 32;
+        out->trusts[shapes[i] >> PT_SHAPE_TRUST_SHIFT & 15u]++;
     }
 }
 
@@ -405,14 +474,25 @@ static int compute(struct walk *walk, struct pt_pool *pool)
         error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, walk->store, pool, walk->progress, 0.0, 0.04);
     if (!error)
         error = pt_neighbours_create(&walk->coarse, cloud, FAR_STRATA, walk->store, pool, walk->progress, 0.04, 0.05);
+    if (!error) {
+        walk->trust = (struct pt_trust){.cloud = cloud, .tree = &walk->tree, .coarse = &walk->coarse, .desc = walk->desc,
+                                        .beams = &walk->beams, .chunks = out->chunks, .surfels = out->surfels,
+                                        .shapes = (_Atomic uint32_t *)out->shapes, .base = out->spacing_base,
+                                        .progress = walk->progress};
+        error = pt_trust_create(&walk->trust);
+    }
     if (error) {
+        pt_trust_destroy(&walk->trust);
+        pt_neighbours_destroy(&walk->coarse);
         pt_neighbours_destroy(&walk->tree);
         return error;
     }
     walk->rows = !walk->beams.count && lies_in_rows(walk); // a station's cells tell better
     pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
+    error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : judge(walk, pool);
+    pt_trust_destroy(&walk->trust);
     pt_neighbours_destroy(&walk->coarse);
-    error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : vote_sides(walk, pool);
+    error = error ? error : vote_sides(walk, pool);
     pt_neighbours_destroy(&walk->tree);
     if (error)
         return error;
@@ -425,7 +505,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     }
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         pt_store_look(walk->store);
-        gather_shapes(&out->chunks[c], out->shapes + out->chunks[c].first);
+        gather_shapes(out, &out->chunks[c]);
         out->chunks[c].cone_cosine = -2.0f;
         if (out->oriented)
             pt_chunk_cone(&out->chunks[c], out->surfels + out->chunks[c].first);
@@ -508,6 +588,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->info.estimated_normals = analysis->estimated;
     for (int kind = 0; kind < 6; kind++)
         cloud->info.kinds[kind] = analysis->kinds[kind];
+    memcpy(cloud->info.trusts, analysis->trusts, sizeof cloud->info.trusts);
     cloud->info.seen_through = analysis->seen_through;
     pt_pages_free(cloud->surfels, cloud->slots * 4);
     pt_pages_free(cloud->shapes, cloud->slots * 4);

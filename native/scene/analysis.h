@@ -6,6 +6,7 @@
 
 #include "neighbourhood.h"
 #include "sights.h"
+#include "shared/words.h"
 
 struct pt_analysis {
     struct pt_store *store;     // where these arrays lie
@@ -13,7 +14,7 @@ struct pt_analysis {
     struct pt_chunk *chunks;
     uint64_t slots;
     double spacing_base;
-    uint64_t estimated, kinds[6], seen_through;
+    uint64_t estimated, kinds[6], seen_through, trusts[PT_TRUST_LEVELS];
     int oriented;
     struct pt_sights sights; // where free space is asked for
 };
@@ -35,16 +36,20 @@ void pt_analysis_free(struct pt_analysis *analysis);
 // some 512 chunks that lie evenly among all.
 int pt_shapes_beside(const struct patina_cloud *cloud);
 
+// The trust that each of the PT_TRUST_LEVELS stands for, and the nearest level.
+double pt_trust_of_level(uint32_t level);
+uint32_t pt_level_of_trust(double trust);
+
 // Shape words. base: the cloud's spacing_base.
 uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base);
-// Half axes, sigma and certainty of a word; out->axis where normal_bits are a normal.
+// Half axes, sigma and trust of a word; out->axis where normal_bits are a normal.
 void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct pt_neighbourhood *out);
 
 // What else is known of the point in a place of the tree may shrink its footprint.
 typedef void pt_limit(void *context, uint32_t place, const struct pt_sample *sample, struct pt_neighbourhood *hood);
 
-// The leaf's lanes described: neighbours, plane, kind; then limited, where limit is not NULL. found is room to work in.
-void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t k,
-                      struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context);
+// The lanes of a leaf described: neighbours, plane, kind; then limited, where limit is not NULL. found is room to work in.
+void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t lanes,
+                      uint32_t k, struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context);
 
 #endif

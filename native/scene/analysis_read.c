@@ -58,8 +58,8 @@ static void read_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
                 to->sigma[at] = (float)hood.sigma;
             if (to->kind)
                 to->kind[at] = (uint8_t)hood.kind;
-            if (to->certainty)
-                to->certainty[at] = (float)hood.certainty;
+            if (to->trust)
+                to->trust[at] = (float)hood.trust;
             if (to->seen_through)
                 to->seen_through[at] = cloud->shapes && (cloud->shapes[slot] & PT_SHAPE_SEEN_THROUGH);
         }
@@ -138,7 +138,7 @@ static void clear(const patina_neighbourhoods *to, size_t count)
         void *data;
         size_t size;
     } arrays[] = {{to->normal, 12}, {to->axis, 12},     {to->spacing, 4},     {to->half_axes, 8},   {to->sigma, 4},
-                  {to->kind, 1},    {to->certainty, 4}, {to->soft_radius, 4}, {to->uncertainty, 4}, {to->seen_through, 1}};
+                  {to->kind, 1},    {to->trust, 4}, {to->soft_radius, 4}, {to->uncertainty, 4}, {to->seen_through, 1}};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         if (arrays[i].data)
             memset(arrays[i].data, 0, count * arrays[i].size);

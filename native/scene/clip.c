@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "clip.h"
+#include "analysis.h"
 #include "mask.h"
 #include "scans.h"
 
@@ -43,19 +44,49 @@ static int invert_clip(const patina_clip *clip, struct pt_inverse_clip *out)
 
 // ---- shapes --------------------------------------------------------------------------------------------------------------
 
+static uint64_t below(const patina_cloud_info *info, uint32_t level)
+{
+    uint64_t count = 0;
+    for (uint32_t i = 0; i < level; i++)
+        count += info->trusts[i];
+    return count;
+}
+
+uint32_t pt_trusted_from(const struct pt_instance *instance)
+{
+    static const double slack = 1e-4; // the levels in float32 are what they are
+    const patina_cloud_style *style = &instance->style;
+    const patina_cloud_info *info = &instance->cloud->info;
+    double least = (double)(style->least_trust == 0.0f ? PATINA_TRUST_DEFAULT : style->least_trust);
+    uint32_t level = 0;
+    if (!info->has_shapes)
+        return 0;
+    if (style->hidden_kinds >> PATINA_KIND_STRAY & 1u)
+        least = fmax(least, (double)PATINA_TRUST_DEFAULT);
+    while (level < PT_TRUST_LEVELS - 1 && pt_trust_of_level(level) < least - slack)
+        level++;
+    const uint64_t untrusted = below(info, level);
+    return untrusted && untrusted < below(info, PT_TRUST_LEVELS) ? level : 0;
+}
+
+uint64_t pt_untrusted(const struct pt_instance *instance)
+{
+    return below(&instance->cloud->info, pt_trusted_from(instance));
+}
+
 int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8])
 {
     const patina_cloud_style *style = &instance->style;
     uint32_t any = 0;
     memset(hidden, 0, 8 * sizeof *hidden);
-    const int asked = style->hidden_kinds || style->least_certainty > 0.0f || style->free_space == PATINA_FREE_SPACE_USE;
+    const uint32_t trusted = pt_trusted_from(instance);
+    const int asked = style->hidden_kinds || trusted || style->free_space == PATINA_FREE_SPACE_USE;
     if (!asked || !instance->cloud->info.has_shapes)
         return 0;
     for (uint32_t sight = 0; sight < 256; sight++) {
         const uint32_t word = sight << PT_SHAPE_SIGHT_SHIFT;
-        const float certainty = (float)(word >> PT_SHAPE_CERTAINTY_SHIFT & 15u) / 15.0f;
         const uint32_t out = (style->hidden_kinds >> (word >> PT_SHAPE_KIND_SHIFT & 7u) & 1u) |
-                             (certainty < style->least_certainty) |
+                             ((word >> PT_SHAPE_TRUST_SHIFT & 15u) < trusted) |
                              (style->free_space == PATINA_FREE_SPACE_USE && (word & PT_SHAPE_SEEN_THROUGH));
         hidden[sight / 32] |= out << sight % 32;
         any |= out;

@@ -20,8 +20,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Files of version 11 are neither packed nor without order, those of 10 have no sums of pages either.
-enum { SECTION = 1 << 16, VERSION = 12, UNPACKED = 11, WITHOUT_PAGES = 10, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
+// Files of version 12 do not count levels of trust, which their analysis does not have. Files of version 11 are neither packed nor without order, those of 10 have no sums of pages either.
+enum { SECTION = 1 << 16, VERSION = 13, UNTRUSTED = 12, UNPACKED = 11, WITHOUT_PAGES = 10, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
 enum { INFO_BYTES = offsetof(patina_cloud_info, packed) }; // of what a cloud tells; the header has the rest
 static const char magic[8] = {'p', 'a', 't', 'i', 'n', 'a', '\n', '\x1a'};
 
@@ -39,13 +39,15 @@ struct header {
     uint64_t page_sum;       // the tail: of the sums of pages, which lie behind the last section
     double packed_error;
     uint32_t packed, unordered;
+    uint64_t trusts[16]; // points of each level
 };
-_Static_assert(INFO_BYTES % 8 == 0 && sizeof(struct header) == offsetof(struct header, page_sum) + 24, "a header has no holes");
+_Static_assert(INFO_BYTES % 8 == 0 && sizeof(struct header) == offsetof(struct header, page_sum) + 24 + 128, "a header has no holes");
 
 static size_t tail_size(const struct header *header)
 {
     return header->version == WITHOUT_PAGES ? 0
            : header->version == UNPACKED    ? sizeof header->page_sum
+           : header->version == UNTRUSTED   ? offsetof(struct header, trusts) - offsetof(struct header, page_sum)
                                             : sizeof *header - offsetof(struct header, page_sum);
 }
 
@@ -201,6 +203,7 @@ static void fill_header(struct header *header, const struct patina_cloud *cloud)
     header->packed_error = cloud->info.packed_error;
     header->packed = cloud->packed != 0;
     header->unordered = cloud->unordered != 0;
+    memcpy(header->trusts, cloud->info.trusts, sizeof header->trusts);
     header->check = check_of(header, cloud->chunks);
 }
 
@@ -401,7 +404,7 @@ static int check_version(const char *path, const struct header *header, const pa
 {
     if (memcmp(header->magic, magic, sizeof magic))
         return refuse(path, "not a saved cloud");
-    if ((header->version != VERSION && header->version != UNPACKED && header->version != WITHOUT_PAGES) ||
+    if ((header->version != VERSION && header->version != UNTRUSTED && header->version != UNPACKED && header->version != WITHOUT_PAGES) ||
         header->chunk_size != sizeof(struct pt_chunk) || info->struct_size != INFO_BYTES)
         return refuse(path, "a saved cloud of another version");
     return header->size == size ? PATINA_OK : refuse(path, "a saved cloud that was cut short");
@@ -442,7 +445,7 @@ static int read_header(const char *path, const struct pt_disk *disk, struct pati
     size_t got;
     if (pt_disk_read(disk, 0, header, sizeof *header, &got) || got != sizeof *header)
         return refuse(path, "not a saved cloud");
-    if (header->version != VERSION) { // it has none of these
+    if (header->version == UNPACKED || header->version == WITHOUT_PAGES) { // it has none of these
         header->packed = header->unordered = 0;
         header->packed_error = 0.0;
     }
@@ -455,6 +458,8 @@ static int read_header(const char *path, const struct pt_disk *disk, struct pati
     cloud->info.packed = header->packed;
     cloud->info.packed_error = header->packed_error;
     cloud->info.numbered = header->unordered;
+    if (header->version == VERSION)
+        memcpy(cloud->info.trusts, header->trusts, sizeof header->trusts);
     cloud->packed = header->packed != 0;
     cloud->unordered = header->unordered != 0;
     cloud->slots = header->slots;
@@ -517,6 +522,21 @@ static void move_by(struct patina_cloud *cloud, const double offset[3])
     }
 }
 
+// An analysis of an older version has no trust. The caller analyzes the cloud again, as one that never was.
+static void forget_analysis(const char *path, struct patina_cloud *cloud, const struct pt_section *shapes)
+{
+    pt_log(PT_LOG_INFO, "%s: saved by an older version. The points are analyzed again, for their trust.", path);
+    pt_pages_free(cloud->shapes, shapes->size);
+    cloud->shapes = NULL;
+    cloud->mapped &= ~(1u << PT_ARRAY_SHAPES);
+    cloud->info.has_shapes = 0;
+    cloud->info.seen_through = 0;
+    memset(cloud->info.kinds, 0, sizeof cloud->info.kinds);
+    if (cloud->info.estimated_normals == cloud->info.drawn) // none of them was given
+        cloud->info.has_normals = cloud->info.normals_oriented = 0;
+    cloud->info.estimated_normals = 0;
+}
+
 static int open_disk(const char *path, const struct pt_disk *disk, const double *offset, struct patina_cloud *cloud)
 {
     struct header header;
@@ -545,6 +565,8 @@ static int open_disk(const char *path, const struct pt_disk *disk, const double 
     cloud->beside = header.beside != 0;
     if (own_sights(&cloud->sights))
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    if (header.version != VERSION && cloud->info.has_shapes)
+        forget_analysis(path, cloud, &sections[PT_ARRAY_SHAPES]);
     code = check_cloud(path, cloud);
     code = code ? code : read_pages(path, disk, &header, pages_at(sections), cloud);
     if (code)

@@ -27,7 +27,8 @@ struct pt_neighbourhood {
     double major, minor;       // half axes of the footprint; 0: none
     double spacing, sigma;     // 0: unknown
     double sampled;            // the spacing before bounds: what a picture's levels are counted with
-    double certainty;          // 0..1
+    double certainty;          // 0..1, of the kind; shape words do not hold it
+    double trust;              // 0..1, see trust.h; not found here
     int beside;                // another surface lies that near
     double uneven;             // spacing along the greater axis in those across, as measured; 1: not told
 };

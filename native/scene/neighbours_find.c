@@ -3,6 +3,7 @@
 // box is never farther than what lies in it; ties therefore come out as their numbers say.
 #include "neighbours.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -13,7 +14,7 @@
 
 struct walk {
     _Alignas(64) double place[3][PT_LEAF];   // of the lanes, in the frame that is walked
-    _Alignas(64) double worst[PT_LEAF];      // square of the distance to the k-th found; negative: a lane that does not look
+    _Alignas(64) double worst[PT_LEAF];      // square of the distance to the k-th found; negative: a lane that does not look; DBL_MAX: fewer are found, and points at infinity are none
     double middle[3];                        // of them: what is nearest to it is walked first
     const struct pt_neighbours *tree, *from; // that is walked, that the lanes are of
     struct pt_found *found;
@@ -42,12 +43,16 @@ static void set_frame(struct walk *walk, const double origin[3], uint32_t frame)
     const struct pt_neighbours *tree = walk->from;
     const float *xyz = tree->places + (size_t)walk->leaf * 3 * PT_LEAF;
     const double *own = tree->cloud->chunks[tree->leaf_chunk[walk->leaf]].origin;
-    const uint32_t count = (uint32_t)__builtin_popcount(pt_leaf_lanes(tree, walk->leaf));
+    uint32_t first = 0, last = (uint32_t)__builtin_popcount(pt_leaf_lanes(tree, walk->leaf)) - 1;
+    while (first < last && !isfinite(xyz[first])) // points may be out of the tree: trust.c
+        first++;
+    while (last > first && !isfinite(xyz[last]))
+        last--;
     for (int k = 0; k < 3; k++) {
         const double shift = own[k] - origin[k];
         for (int i = 0; i < PT_LEAF; i++)
             walk->place[k][i] = (double)xyz[k * PT_LEAF + i] + shift;
-        walk->middle[k] = 0.5 * (walk->place[k][0] + walk->place[k][count - 1]);
+        walk->middle[k] = 0.5 * (walk->place[k][first] + walk->place[k][last]);
     }
     walk->frame = frame;
 }
@@ -78,7 +83,7 @@ static void begin_lane(struct walk *walk, uint32_t lane)
     for (uint32_t i = 0; i < (walk->k + ROUND - 1) / ROUND * ROUND; i++)
         walk->found->square[lane][i] = INFINITY;
     walk->found->count[lane] = 0;
-    walk->worst[lane] = INFINITY;
+    walk->worst[lane] = DBL_MAX;
 }
 
 // Those of a leaf's points that `near` marks, which were near enough when it was made; the leaf's first place.
@@ -103,7 +108,7 @@ static inline void take_each(struct walk *walk, uint32_t lane, const double squa
         places[at] = place;
     }
     walk->found->count[lane] = count;
-    walk->worst[lane] = count == walk->k ? squares[count - 1] : INFINITY;
+    walk->worst[lane] = count == walk->k ? squares[count - 1] : DBL_MAX;
 }
 
 // ---- plain -----------------------------------------------------------------------------------------------------------------
@@ -259,7 +264,7 @@ TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk
                 _mm256_storeu_si256((__m256i *)(places + 8 * i), p[i]);
             }
             walk->found->count[lane] = count;
-            walk->worst[lane] = count == walk->k ? squares[last] : INFINITY;
+            walk->worst[lane] = count == walk->k ? squares[last] : DBL_MAX;
             take_each(walk, lane, square, near, first);
             return;
         }
@@ -280,7 +285,7 @@ TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk
         _mm256_storeu_si256((__m256i *)(places + 8 * i), p[i]);
     }
     walk->found->count[lane] = count;
-    walk->worst[lane] = count > last ? squares[last] : INFINITY;
+    walk->worst[lane] = count > last ? squares[last] : DBL_MAX;
 }
 
 TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near,

@@ -107,8 +107,8 @@ static int check_color(const patina_scene *scene, patina_cloud_style *style, con
         return fail(scene, "cloud style: no such free_space");
     if (style->hidden_kinds >> 6)
         return fail(scene, "cloud style: hidden_kinds has unknown bits");
-    if (!(style->least_certainty >= 0.0f && style->least_certainty <= 1.0f))
-        return fail(scene, "cloud style: least_certainty must be within 0 and 1");
+    if (!isfinite(style->least_trust) || style->least_trust > 1.0f)
+        return fail(scene, "cloud style: least_trust must be at most 1");
     style->contrast = style->contrast == 0.0f ? 1.0f : style->contrast;
     if (style->mask && (style->mask->handle.magic != PT_MAGIC || style->mask->of != cloud->alive))
         return fail(scene, "cloud style: the mask is destroyed, or of another cloud");

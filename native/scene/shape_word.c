@@ -28,11 +28,22 @@ static uint32_t class_of(double length, double base)
     return steps < 0.0 ? 1u : steps > 62.0 ? 63u : (uint32_t)steps + 1u;
 }
 
+double pt_trust_of_level(uint32_t level)
+{
+    const double doubt = (PT_TRUST_LEVELS - 1 - level) / (PT_TRUST_LEVELS - 1.0);
+    return 1.0 - doubt * doubt;
+}
+
+uint32_t pt_level_of_trust(double trust)
+{
+    return PT_TRUST_LEVELS - 1 - (uint32_t)((PT_TRUST_LEVELS - 1) * sqrt(1.0 - fmin(fmax(trust, 0.0), 1.0)) + 0.5);
+}
+
 uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base)
 {
     uint32_t word = class_of(hood->major, base) | class_of(hood->sigma, base / 16.0) << PT_SHAPE_SIGMA_SHIFT;
     word |= hood->kind << PT_SHAPE_KIND_SHIFT | (hood->beside ? PT_SHAPE_BESIDE : 0u);
-    word |= (uint32_t)(15.0 * fmin(fmax(hood->certainty, 0.0), 1.0) + 0.5) << PT_SHAPE_CERTAINTY_SHIFT;
+    word |= pt_level_of_trust(hood->trust) << PT_SHAPE_TRUST_SHIFT;
     if (!(hood->major > 0.0) || !(hood->minor > 0.0))
         return word;
     const double steps = 4.0 * pt_log2(hood->major / hood->minor);
@@ -58,7 +69,7 @@ void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct p
     out->major = base * pt_spacing_of_class(shape & 63u);
     out->minor = out->major * pt_exp2(-(double)(shape >> PT_SHAPE_RATIO_SHIFT & 15u) / 4.0);
     out->sigma = base / 16.0 * pt_spacing_of_class(shape >> PT_SHAPE_SIGMA_SHIFT & 63u);
-    out->certainty = (shape >> PT_SHAPE_CERTAINTY_SHIFT & 15u) / 15.0;
+    out->trust = pt_trust_of_level(shape >> PT_SHAPE_TRUST_SHIFT & 15u);
     out->beside = (shape & PT_SHAPE_BESIDE) != 0;
     if (normal_bits == PT_NORMAL_NONE)
         return;

@@ -8,7 +8,7 @@
 
 struct columns {
     uint64_t count;
-    float *position, *normal, *spacing, *half_axes, *sigma, *certainty;
+    float *position, *normal, *spacing, *half_axes, *sigma, *trust;
     uint8_t *kind, *seen_through;
 };
 
@@ -17,7 +17,7 @@ enum { ROW = 24 + 12 + 4 + 8 + 4 + 4 + 2, ROWS = 4096 }; // with positions in fl
 static int allocate(struct columns *c, uint64_t count)
 {
     c->count = count;
-    float **floats[] = {&c->position, &c->normal, &c->half_axes, &c->spacing, &c->sigma, &c->certainty};
+    float **floats[] = {&c->position, &c->normal, &c->half_axes, &c->spacing, &c->sigma, &c->trust};
     static const size_t widths[] = {3, 3, 2, 1, 1, 1};
     for (int i = 0; i < 6; i++)
         if (!(*floats[i] = malloc(count * widths[i] * sizeof(float) + 1)))
@@ -34,7 +34,7 @@ static void release(struct columns *c)
     free(c->half_axes);
     free(c->spacing);
     free(c->sigma);
-    free(c->certainty);
+    free(c->trust);
     free(c->kind);
     free(c->seen_through);
 }
@@ -60,7 +60,7 @@ static int write_rows(FILE *file, const struct columns *c, const double origin[3
             at = put(at, &c->spacing[i], 4);
             at = put(at, &c->half_axes[2 * i], 8);
             at = put(at, &c->sigma[i], 4);
-            at = put(at, &c->certainty[i], 4);
+            at = put(at, &c->trust[i], 4);
             at = put(at, &c->kind[i], 1);
             at = put(at, &c->seen_through[i], 1);
         }
@@ -84,7 +84,7 @@ static int write_ply(const char *path, const struct columns *c, const double ori
         file,
         "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
         "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
-        "radius\nproperty float radius_minor\nproperty float sigma\nproperty float certainty\nproperty uchar kind\nproperty "
+        "radius\nproperty float radius_minor\nproperty float sigma\nproperty float trust\nproperty uchar kind\nproperty "
         "uchar seen_through\nend_header\n",
         __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)c->count, type,
         type, type);
@@ -127,7 +127,7 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, int gri
                                           .half_axes = columns->half_axes,
                                           .sigma = columns->sigma,
                                           .kind = columns->kind,
-                                          .certainty = columns->certainty,
+                                          .trust = columns->trust,
                                           .seen_through = columns->seen_through};
     if (!code)
         code = patina_cloud_neighbourhoods(cloud, &wanted, NULL);

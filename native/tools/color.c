@@ -90,6 +90,14 @@ static int parse_tint(const char *text, struct tool_color *color)
     return 0;
 }
 
+// 0 draws all points: below 0 in a style, whose 0 is the default.
+static int parse_trust(const char *value, struct tool_color *color)
+{
+    const int bad = parse_between(value, 0, 1, &color->least_trust);
+    color->least_trust = color->least_trust > 0 ? color->least_trust : -1;
+    return bad;
+}
+
 int tool_parse_color(const char *name, const char *value, struct tool_color *color)
 {
     double n[3];
@@ -114,8 +122,8 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
         return parse_classes(value, color->hidden);
     if (!strcmp(name, "--hide-kinds"))
         return parse_kinds(value, &color->hidden_kinds);
-    if (!strcmp(name, "--least-certainty"))
-        return parse_between(value, 0, 1, &color->least_certainty);
+    if (!strcmp(name, "--trust"))
+        return parse_trust(value, color);
     if (!strcmp(name, "--free-space")) {
         static const char *const words[] = {"off", "show", "use"};
         for (color->free_space = 0; color->free_space < 3; color->free_space++)
@@ -239,7 +247,7 @@ int tool_set_color(const struct tool_color *color, const patina_cloud *cloud, fl
     memcpy(style->hidden_classes, color->hidden, sizeof style->hidden_classes);
     style->free_space = color->free_space;
     style->hidden_kinds = color->hidden_kinds;
-    style->least_certainty = color->least_certainty;
+    style->least_trust = color->least_trust;
     for (int k = 0; k < 2; k++)
         style->ramp_range[k] = color->has_range ? (float)color->range[k] : classes ? 255.0f * (float)k : 0.0f;
     if (color->source == PATINA_COLOR_SCALAR && !color->has_range && !classes)

@@ -42,7 +42,7 @@ static const char *of_the_whole(const struct tool_options *options)
     return options->panorama[0]                ? "--panorama"
            : options->settings.pixel_noise > 0 ? "--noise"
            : options->pass != PATINA_PASS_COMBINED && !options->has_pass_range && options->pass != PATINA_PASS_NORMAL &&
-                   options->pass != PATINA_PASS_CERTAINTY && options->pass != PATINA_PASS_SHADOW &&
+                   options->pass != PATINA_PASS_TRUST && options->pass != PATINA_PASS_SHADOW &&
                    options->pass != PATINA_PASS_LINE
                ? "--pass without its range"
            : options->repeat || options->json ? "--repeat and --stats"

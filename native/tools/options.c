@@ -420,8 +420,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
     if (tool_check_soft(&options->soft, options->file_count))
         return TOOL_USAGE;
     if (options->analysis == TOOL_UNANALYSED &&
-        (options->color.free_space || options->color.hidden_kinds || options->color.least_certainty > 0))
-        return tool_misuse("--free-space, --hide-kinds and --least-certainty need the analysis");
+        (options->color.free_space || options->color.hidden_kinds || options->color.least_trust > 0))
+        return tool_misuse("--free-space, --hide-kinds and --trust need the analysis");
     if (options->settings.surface != PATINA_SURFACE_RANGES && (options->range_gamma > 0.0 || options->range_pixel > 0.0 ||
                                                                options->range_sharpness > 0.0 || options->range_culling > 0.0))
         return tool_misuse("--range-... options need --surface ranges");
@@ -434,9 +434,9 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("-o %s: pictures are written as PNG; name it .png", options->output);
     if (options->pass != PATINA_PASS_COMBINED && (options->panorama[0] || !options->output))
         return tool_misuse("--pass makes a picture, without --panorama: -o OUT.png");
-    if (options->pass == PATINA_PASS_CERTAINTY || options->pass == PATINA_PASS_THICKNESS) {
+    if (options->pass == PATINA_PASS_TRUST || options->pass == PATINA_PASS_THICKNESS) {
         if (options->analysis == TOOL_UNANALYSED)
-            return tool_misuse("--pass certainty and thickness need the analysis");
+            return tool_misuse("--pass trust and thickness need the analysis");
     }
     if (options->panorama[0] && (options->repeat || options->json || options->planes || options->load_shadows ||
                                  options->save_shadows || options->ortho_width > 0))

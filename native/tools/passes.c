@@ -64,7 +64,7 @@ static int find_range(uint32_t pass, const float *values, const float *depth, si
 {
     range[0] = 0.0;
     range[1] = 1.0;
-    if (pass == PATINA_PASS_CERTAINTY || pass == PATINA_PASS_SHADOW || pass == PATINA_PASS_LINE)
+    if (pass == PATINA_PASS_TRUST || pass == PATINA_PASS_SHADOW || pass == PATINA_PASS_LINE)
         return PATINA_OK;
     float *sorted = malloc(count * sizeof *sorted + 1);
     size_t known = 0;

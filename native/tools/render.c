@@ -86,8 +86,8 @@ static int needs_analysis(const struct tool_options *options, int has_normals)
 {
     const struct tool_color *color = &options->color;
     return options->settings.surface != PATINA_SURFACE_RANGES || options->soft.model || color->free_space ||
-           color->hidden_kinds || color->least_certainty > 0.0f || (options->cull && !has_normals) ||
-           options->pass == PATINA_PASS_CERTAINTY || options->pass == PATINA_PASS_THICKNESS;
+           color->hidden_kinds || color->least_trust > 0.0f || (options->cull && !has_normals) ||
+           options->pass == PATINA_PASS_TRUST || options->pass == PATINA_PASS_THICKNESS;
 }
 
 static int analyse(struct job *job, patina_cloud *cloud, const char *path, const struct tool_stations *stations)

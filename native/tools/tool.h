@@ -61,7 +61,7 @@ struct tool_color {
     float fixed[3], exposure, contrast;
     uint32_t hidden[8];
     uint32_t free_space, hidden_kinds; // of patina_cloud_style
-    float least_certainty;
+    float least_trust;
     patina_clip clips[TOOL_CLIPS];
     int clip_count;
     float tint[4]; // and width; 0: none

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// assess: certainty and thickness of the points that pixels show, into the crop; twin of native/device_cpu/kernels/assess.c
+// assess: trust and thickness of the points that pixels show, into the crop; twin of native/device_cpu/kernels/assess.c
 #version 430 core
 #include "shared/picture.h"
 #include "lib/math.glsl"
@@ -10,7 +10,7 @@ layout(local_size_x = 32, local_size_y = 8) in;
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { assess_args args; };
 layout(std430, binding = BIND_shapes) readonly buffer shapes_block { uint shapes[]; };
-layout(std430, binding = BIND_certainty) writeonly buffer certainty_block { float certainty[]; };
+layout(std430, binding = BIND_trust) writeonly buffer trust_block { float trust[]; };
 layout(std430, binding = BIND_thickness) writeonly buffer thickness_block { float thickness[]; };
 
 void main()
@@ -25,10 +25,11 @@ void main()
     if (!ours && args.first == 0u)
         return;
     uint word = ours ? shapes[pt_place_of(id, at)] : 0u, sigma_class = word >> PT_SHAPE_SIGMA_SHIFT & PT_SHAPE_CLASS_BITS;
-    precise float sure = float(word >> PT_SHAPE_CERTAINTY_SHIFT & 15u) * PT_CERTAINTY_STEP;
+    precise float doubt = ours ? float(15u - (word >> PT_SHAPE_TRUST_SHIFT & 15u)) * PT_TRUST_STEP : 1.0;
+    precise float sure = 1.0 - doubt * doubt;
     precise float sigma = args.instance.spacing[sigma_class] * args.sigma_scale;
-    if (args.certainty != 0u)
-        certainty[to] = sure;
+    if (args.trust != 0u)
+        trust[to] = sure;
     if (args.thickness != 0u)
         thickness[to] = sigma_class != 0u ? sigma : 0.0;
 }

@@ -31,16 +31,16 @@ struct paper_args {
     float grain;
 };
 
-#define PT_CERTAINTY_STEP 0.0666666701f // 1 / 15
+#define PT_TRUST_STEP 0.0666666701f // 1 / 15: a level of trust less is so much more of the root of doubt
 
-// assess: what is known of the point whose surface a pixel shows: its certainty, 0..1, and its thickness, world units. 0 where
+// assess: what is known of the point whose surface a pixel shows: its trust, 0..1, and its thickness, world units. 0 where
 // nothing is known, or nothing is. Visits view.rect, which lies within the crop.
 struct assess_args {
     struct view_args view;
     struct instance_args instance;
     uint32_t crop_x, crop_y, crop_width;
     uint32_t first;                // 1: pixels that the instance does not show become 0; else they stay
-    uint32_t certainty, thickness; // either may be left out
+    uint32_t trust, thickness; // either may be left out
     float sigma_scale;             // times instance.spacing of its class: a thickness
 };
 

@@ -14,14 +14,16 @@
 // is 2^(-k / 4) of it. 10-15: a, the major axis is cos(a pi / 64) t1 + sin(a pi / 64) t2 in the frame of the point's normal n in
 // its object: s = n.z >= PT_SHAPE_UP ? 1 : -1, q = -1 / (s + n.z), b = n.x n.y q, t1 = (1 + s n.x^2 q, s b, -s n.x),
 // t2 = (b, s + n.y^2 q, -n.y) (Duff et al. 2017); below 0, n.z is -1 / 4095 at most. 16-21: class of the thickness sigma, in
-// sixteenths of the spacings' unit; 0: not known. 22-24: kind. 25-28: certainty, of 15.
+// sixteenths of the spacings' unit; 0: not known. 22-24: kind. 25-28: level of trust: l stands for 1 - ((15 - l) / 15)^2.
 #define PT_SHAPE_CLASS_BITS 63u // of each class
 #define PT_SHAPE_RATIO_SHIFT 6
 #define PT_SHAPE_ANGLE_SHIFT 10
 #define PT_SHAPE_SIGMA_SHIFT 16
 #define PT_SHAPE_KIND_SHIFT 22
-#define PT_SHAPE_CERTAINTY_SHIFT 25 // of 15
-#define PT_SHAPE_SIGHT_SHIFT 22     // kind, certainty and seen through are a byte: what hides points is a set of such
+#define PT_SHAPE_TRUST_SHIFT 25
+#define PT_SHAPE_TRUST_BITS (15u << PT_SHAPE_TRUST_SHIFT)
+#define PT_TRUST_LEVELS 16
+#define PT_SHAPE_SIGHT_SHIFT 22     // kind, trust and seen through are a byte: what hides points is a set of such
 #define PT_SHAPE_SEEN_THROUGH (1u << 29) // a scanner looked through where it lies
 #define PT_SHAPE_UP -1e-4f // n.z of which s is 1
 #define PT_KIND_UNKNOWN 0u

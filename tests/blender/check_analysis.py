@@ -84,7 +84,7 @@ def test_final_is_analyzed():
     check((render()["Combined"] == picture["Combined"]).all(), "another picture")
 
 
-def test_certainty_and_thickness():
+def test_trust_and_thickness():
     """Each pixel has what the analysis found of the point that it shows, in the scene's units; 0 where nothing is known."""
     scene = fresh_scene(160, 90)
     scene.patina.fill = 'CLOSED'
@@ -95,29 +95,29 @@ def test_certainty_and_thickness():
     unknown = add_points(places, name="unknown", matrix=Matrix.Translation((1.1, 0, -4)) @ Matrix.Scale(0.5, 4))
     unknown.patina.analysis = 'OFF'
     layer = scene.view_layers[0]
-    layer.patina.use_pass_certainty = layer.patina.use_pass_thickness = layer.use_pass_object_index = True
+    layer.patina.use_pass_trust = layer.patina.use_pass_thickness = layer.use_pass_object_index = True
     known.pass_index = 7
     picture = render()
     ids = written[-1][1]["NUMBERS"][..., 0].astype(np.int64)
     shows = next(values for name, values in picture.items() if name in ("IndexOB", "Object Index"))[..., 0] == 7
     check(shows.sum() > 500 and not shows[:, 80:].any(), f"{shows.sum()} pixels")
     cloud, = (cloud for _, cloud in clouds.CACHE._entries.values() if cloud.has_shapes)
-    found = cloud.neighbourhoods("sigma", "certainty")
-    sigma, certainty = picture["Thickness"][..., 0], picture["Certainty"][..., 0]
+    found = cloud.neighbourhoods("sigma", "trust")
+    sigma, trust = picture["Thickness"][..., 0], picture["Trust"][..., 0]
     check(ids[shows].max() < len(places), "the first object's points have the first numbers")
     check_close(sigma[shows], 0.5 * found["sigma"][ids[shows]], 1e-6, "thickness")
-    check_close(certainty[shows], found["certainty"][ids[shows]], 1e-6, "certainty")
+    check_close(trust[shows], found["trust"][ids[shows]], 1e-6, "trust")
     check(0.005 < np.median(sigma[shows]) < 0.02, f"noise of 0.01 is {np.median(sigma[shows]):.4f} thick")
-    check(0 <= certainty.min() and certainty.max() <= 1 and np.median(certainty[shows]) > 0.2, "certainty")
+    check(0 <= trust.min() and trust.max() <= 1 and np.median(trust[shows]) > 0.2, "trust")
     check((picture["Combined"][:, 80:, 3] == 1).sum() > 500, "points without an analysis")
-    check(not sigma[~shows].any() and not certainty[~shows].any(), "0 where nothing is known, and where nothing is")
+    check(not sigma[~shows].any() and not trust[~shows].any(), "0 where nothing is known, and where nothing is")
     if bpy.app.version >= (5, 0, 0):  # the compositor is a node group there
         return
     scene.use_nodes = True
     tree = scene.node_tree
     tree.nodes.clear()
     source, target = tree.nodes.new('CompositorNodeRLayers'), tree.nodes.new('CompositorNodeComposite')
-    for name, values in (("Thickness", sigma), ("Certainty", certainty)):
+    for name, values in (("Thickness", sigma), ("Trust", trust)):
         tree.links.new(source.outputs[name], target.inputs["Image"])
         render()
         check_close(saved()[..., 0], values, 1e-6, f"{name} through the compositor")
@@ -254,10 +254,10 @@ def test_range_images_need_none():
         setattr(obj.patina, asks, False)
     clouds.CACHE.clear()
     layer = scene.view_layers[0].patina
-    layer.use_pass_certainty = True
+    layer.use_pass_trust = True
     render()
-    check(only_cloud().has_shapes, "the pass Certainty")
-    layer.use_pass_certainty = False
+    check(only_cloud().has_shapes, "the pass Trust")
+    layer.use_pass_trust = False
     clouds.CACHE.clear()
     obj.patina.ranges.use, scene.patina.surface = False, 'RANGES'
     check((render()["Combined"] == bare["Combined"]).all() and not only_cloud().has_shapes, "the scene's mode")
@@ -351,7 +351,7 @@ def test_operator():
     check(bpy.ops.object.patina_analyze() == {'FINISHED'}, "finished")
     data, count = obj.data, 5001
     found = {}
-    for name, width in (("Normal", 3), ("spacing", 1), ("radius", 1), ("thickness", 1), ("kind", 1), ("certainty", 1)):
+    for name, width in (("Normal", 3), ("spacing", 1), ("radius", 1), ("thickness", 1), ("kind", 1), ("trust", 1)):
         whole = data.attributes[name].data_type == 'INT8'
         values = np.empty(count * width, np.int32 if whole else np.float32)
         data.attributes[name].data.foreach_get("vector" if width == 3 else "value", values)
@@ -361,7 +361,7 @@ def test_operator():
     spacing = np.median(found["spacing"])
     check(abs(spacing - (4 * np.pi / 5000) ** 0.5) < 0.3 * spacing, f"spacing {spacing}")
     check((found["kind"][:-1] == 1).mean() > 0.95 and found["kind"][-1] == 5, f"kinds {np.unique(found['kind'], return_counts=True)}")
-    check((found["radius"][:-1] > 0).all() and 0 <= found["certainty"].min() <= found["certainty"].max() <= 1, "radius, certainty")
+    check((found["radius"][:-1] > 0).all() and 0 <= found["trust"].min() <= found["trust"].max() <= 1, "radius, trust")
     before = found["kind"].copy()
     check(bpy.ops.object.patina_analyze() == {'FINISHED'}, "a second time")
     check(len([name for name in data.attributes.keys() if "kind" in name]) == 1, f"{list(data.attributes.keys())}")
@@ -470,9 +470,9 @@ def test_hidden_points():
     count, alpha = shown()
     check(count == 0 and alpha.sum() > 0.9 * everything.sum() and not said("Analyzing"), f"{count} strays, {alpha.sum()} pixels")
     obj.patina.hide_stray = False
-    obj.patina.least_certainty = 1.0
+    obj.patina.least_trust = 1.0
     check(shown()[1].sum() < 0.7 * everything.sum() and not said("Analyzing"), "doubtful ones")
-    obj.patina.least_certainty = 0.0
+    obj.patina.least_trust = 0.0
     obj.patina.hide_unclassified = True
     count, alpha = shown()
     check(count == 2 and not alpha[50:70, 80 + 40:80 + 50].any() and alpha[:, 30:80].any(), "unclassified")

@@ -166,7 +166,7 @@ def test_points_hide_their_dots():
 
 
 def test_what_is_left_out_shows_no_dots():
-    """Clips, hidden classes and certainty leave points out of the picture; their vertices are there for Blender."""
+    """Clips, hidden classes and trust leave points out of the picture; their vertices are there for Blender."""
     _, points = bright_scene()
     layer = points.data.attributes.new("classification", 'INT', 'POINT')
     layer.data.foreach_set("value", np.tile(np.int32([2, 5]), len(points.data.vertices) // 2))

@@ -97,7 +97,7 @@ def test_what_is_hidden_follows():
     found = shown()
     covered = [float((found.shown.color[..., 3] > 0).mean())]
     built = found.shown.clouds[0].cloud
-    for name, value in (("largest_gap", 0.02), ("hide_stray", True), ("least_certainty", 1.0)):
+    for name, value in (("largest_gap", 0.02), ("hide_stray", True), ("least_trust", 1.0)):
         before = found.pictures
         setattr(obj.patina, name, value)
         yield lambda: newer(before)() and settled(3001)

@@ -138,11 +138,11 @@ def test_analyze_is_undone():
     with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
         bpy.ops.ed.undo_push(message="before")
         bpy.ops.object.patina_analyze('INVOKE_DEFAULT', True)
-    yield lambda: "certainty" in bpy.data.objects["looked at"].data.attributes
+    yield lambda: "trust" in bpy.data.objects["looked at"].data.attributes
     yield lambda: settled(20000)
     with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
         bpy.ops.ed.undo()
-    check("certainty" not in bpy.data.objects["looked at"].data.attributes, "undone")
+    check("trust" not in bpy.data.objects["looked at"].data.attributes, "undone")
     yield lambda: settled(20000)
 
 

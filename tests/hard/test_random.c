@@ -191,7 +191,7 @@ static void add_cloud(struct pcg *random, patina_scene *scene)
     style.clip_off = once_in(random, 4);
     style.free_space = below(random, 3);
     style.hidden_kinds = once_in(random, 4) ? below(random, 64) : 0;
-    style.least_certainty = once_in(random, 4) ? between(random, 0.0, 1.0) : 0.0f;
+    style.least_trust = once_in(random, 4) ? between(random, 0.0, 1.0) : 0.0f;
     style.largest_gap = once_in(random, 4) ? between(random, 0.0, 0.2) : 0.0f;
     style.surface = once_in(random, 4) ? PATINA_SURFACE_RANGES : 0;
     style.range_gamma = once_in(random, 3) ? (once_in(random, 4) ? INFINITY : between(random, 0.0, 0.5)) : 0.0f;

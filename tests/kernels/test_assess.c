@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// assess: certainty and thickness, each alone and both, over all pixels and over an instance's, whole and cropped.
+// assess: trust and thickness, each alone and both, over all pixels and over an instance's, whole and cropped.
 #include "harness.h"
 #include "shared/picture.h"
 
@@ -25,7 +25,7 @@ static struct setup make(struct harness *h, struct rng *rng, enum picture_kind k
                                   .crop_y = crop[1],
                                   .crop_width = crop[2],
                                   .first = wanted & 1,
-                                  .certainty = wanted >> 1 & 1,
+                                  .trust = wanted >> 1 & 1,
                                   .thickness = wanted >> 2 & 1,
                                   .sigma_scale = 0.0625f};
     s.args.view.rect[0] = crop[0] + (wanted & 1 ? 0 : crop[2] / 3);
@@ -41,7 +41,7 @@ static struct setup make(struct harness *h, struct rng *rng, enum picture_kind k
         if (rng_below(rng, 4) == 0)
             s.shapes[i] &= ~(PT_SHAPE_CLASS_BITS << PT_SHAPE_SIGMA_SHIFT); // not known
         if (rng_below(rng, 4) == 0)
-            s.shapes[i] |= 15u << PT_SHAPE_CERTAINTY_SHIFT;
+            s.shapes[i] |= 15u << PT_SHAPE_TRUST_SHIFT;
     }
     return s;
 }
@@ -62,9 +62,9 @@ static void check(struct harness *h, const struct setup *s)
         unset[i] = -77.0f;
     struct pt_buffer *keys = harness_buffer(h, s->picture.keys, s->picture.count * 8);
     struct pt_buffer *shapes = harness_buffer(h, s->shapes, s->shape_count * 4);
-    struct pt_buffer *certainty = harness_buffer(h, unset, inside * 4), *thickness = harness_buffer(h, unset, inside * 4);
-    HARNESS_RUN(h, assess, args, keys, shapes, certainty, thickness);
-    const float *sure = harness_read(h, certainty), *sigma = harness_read(h, thickness);
+    struct pt_buffer *trust = harness_buffer(h, unset, inside * 4), *thickness = harness_buffer(h, unset, inside * 4);
+    HARNESS_RUN(h, assess, args, keys, shapes, trust, thickness);
+    const float *sure = harness_read(h, trust), *sigma = harness_read(h, thickness);
     const struct ref_planes planes = picture_planes(&s->picture);
     for (size_t i = 0; i < inside; i++) {
         const int x = (int)(i % s->crop[2] + s->crop[0]), y = (int)(i / s->crop[2] + s->crop[1]);
@@ -72,14 +72,14 @@ static void check(struct harness *h, const struct setup *s)
         struct ref_assess expected = {0};
         if ((uint32_t)x >= rect[0] && (uint32_t)y >= rect[1] && (uint32_t)x < rect[2] && (uint32_t)y < rect[3])
             expected = ref_assess(args, &planes, s->shapes, x, y);
-        ours += expected.certainty > 0.0;
-        compare(h, "certainty", x, y, sure[i], args->certainty && expected.written ? expected.certainty : -77.0);
+        ours += expected.trust > 0.0;
+        compare(h, "trust", x, y, sure[i], args->trust && expected.written ? expected.trust : -77.0);
         compare(h, "thickness", x, y, sigma[i], args->thickness && expected.written ? expected.thickness : -77.0);
         if (sure[i] > 1.0f)
-            harness_fail(h, "certainty", x, y, "%.9g is above 1", sure[i]);
+            harness_fail(h, "trust", x, y, "%.9g is above 1", sure[i]);
     }
     HARNESS_CHECK(h, inside < 100 || ours > inside / 20);
-    harness_same(h, "certainty", sure, inside, 4, 1, s->crop[2]);
+    harness_same(h, "trust", sure, inside, 4, 1, s->crop[2]);
     harness_same(h, "thickness", sigma, inside, 4, 1, s->crop[2]);
 }
 
@@ -94,17 +94,17 @@ static void passes(struct harness *h)
         }
 }
 
-// Reference alone: one point of certainty 12 / 15 and of the third class, and nothing.
+// Reference alone: one point of trust 12 / 15 and of the third class, and nothing.
 static void sanity(struct harness *h)
 {
     const uint64_t keys[2] = {ref_key(5.0f, 7), REF_EMPTY_KEY};
-    const uint32_t shape = 12u << PT_SHAPE_CERTAINTY_SHIFT | 3u << PT_SHAPE_SIGMA_SHIFT | PT_SHAPE_SEEN_THROUGH | 63u;
+    const uint32_t shape = 12u << PT_SHAPE_TRUST_SHIFT | 3u << PT_SHAPE_SIGMA_SHIFT | PT_SHAPE_SEEN_THROUGH | 63u;
     struct assess_args args = {
         .view = {.width = 2, .height = 1}, .instance = {.id_base = 7, .id_count = 1}, .sigma_scale = 0.25f};
     const struct ref_planes planes = {.keys = keys};
     args.instance.spacing[3] = 2.0f;
     struct ref_assess out = ref_assess(&args, &planes, &shape, 0, 0);
-    HARNESS_CHECK(h, out.written && fabs(out.certainty - 0.8) < 1e-12 && out.thickness == 0.5);
+    HARNESS_CHECK(h, out.written && fabs(out.trust - 0.8) < 1e-12 && out.thickness == 0.5);
     HARNESS_CHECK(h, !ref_assess(&args, &planes, &shape, 1, 0).written);
 }
 

@@ -281,8 +281,8 @@ static void sanity(struct harness *h)
     chunk.clip_keeps = 0;
     HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, NULL, clips, 1) == REF_YES);
     HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, NULL, clips, 0) == REF_NO);
-    const uint32_t shapes[] = {PT_KIND_STRAY << PT_SHAPE_KIND_SHIFT | 15u << PT_SHAPE_CERTAINTY_SHIFT,
-                               15u << PT_SHAPE_CERTAINTY_SHIFT | PT_SHAPE_SEEN_THROUGH};
+    const uint32_t shapes[] = {PT_KIND_STRAY << PT_SHAPE_KIND_SHIFT | 15u << PT_SHAPE_TRUST_SHIFT,
+                               15u << PT_SHAPE_TRUST_SHIFT | PT_SHAPE_SEEN_THROUGH};
     args = (struct sift_args){.by_shape = 1, .hidden_shapes = {[(5 + 8 * 15) / 32] = 1u << (5 + 8 * 15) % 32}};
     chunk.clip_count = 0;
     HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, NULL, NULL, NULL, clips, 0) == REF_NO);

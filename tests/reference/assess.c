@@ -13,7 +13,8 @@ struct ref_assess ref_assess(const struct assess_args *args, const struct ref_pl
         return out;
     const uint32_t word = shapes[ref_key_id(key) - args->instance.id_base], class = word / 65536 % 64;
     out.written = 1;
-    out.certainty = word / 33554432 % 16 / 15.0;
+    const double doubt = (15 - word / 33554432 % 16) / 15.0;
+    out.trust = 1.0 - doubt * doubt;
     out.thickness = class ? (double)args->instance.spacing[class] * args->sigma_scale : 0.0;
     return out;
 }

@@ -390,7 +390,7 @@ struct ref_extract {
 struct ref_extract ref_extract(const struct extract_args *args, const struct ref_planes *planes, int x, int y);
 
 struct ref_assess {
-    double certainty, thickness;
+    double trust, thickness;
     int written; // 0: the pixel stays as it is
 };
 // x, y: in the planes, within view.rect; shapes: by id - id_base.

@@ -44,8 +44,8 @@ enum ref_truth ref_sift(const struct sift_args *args, const struct chunk_view *c
     }
     if (args->by_shape) {
         const uint32_t shape = shapes[chunk->first + slot];
-        const uint32_t kind = shape >> PT_SHAPE_KIND_SHIFT & 7u, certainty = shape >> PT_SHAPE_CERTAINTY_SHIFT & 15u;
-        const uint32_t sight = kind + 8 * certainty + (shape & PT_SHAPE_SEEN_THROUGH ? 128 : 0);
+        const uint32_t kind = shape >> PT_SHAPE_KIND_SHIFT & 7u, trust = shape >> PT_SHAPE_TRUST_SHIFT & 15u;
+        const uint32_t sight = kind + 8 * trust + (shape & PT_SHAPE_SEEN_THROUGH ? 128 : 0);
         if (args->hidden_shapes[sight / 32] >> sight % 32 & 1u)
             return REF_NO;
     }

@@ -172,7 +172,7 @@ def _colors(to: _List) -> None:
 
 def _scans(to: _List) -> None:
     camera = {"distance": 4.5, "elevation": 25}
-    for name, style in {"": {}, ", kinds hidden": {"hidden_kinds": 1 << 4 | 1 << 5}, ", certain": {"least_certainty": 0.5},
+    for name, style in {"": {}, ", kinds hidden": {"hidden_kinds": 1 << 4 | 1 << 5}, ", certain": {"least_trust": 0.5},
                         ", by class": {"hidden_classes": [8] + [0] * 7}}.items():
         to.add(f"scan{name}", {"of": "scan", **style}, camera=camera)
     for name, style in {"": {}, ", gaps": {"largest_gap": 0.05}}.items():

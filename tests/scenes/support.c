@@ -239,7 +239,7 @@ struct picture picture_read_passes(const patina_frame *frame)
     picture.depth = read_pass(frame, PATINA_PASS_DEPTH, pixels, 1);
     picture.normal = read_pass(frame, PATINA_PASS_NORMAL, pixels, 3);
     picture.source = read_pass(frame, PATINA_PASS_SOURCE, pixels, 1);
-    picture.certainty = read_pass(frame, PATINA_PASS_CERTAINTY, pixels, 1);
+    picture.trust = read_pass(frame, PATINA_PASS_TRUST, pixels, 1);
     picture.thickness = read_pass(frame, PATINA_PASS_THICKNESS, pixels, 1);
     picture.density = read_pass(frame, PATINA_PASS_DENSITY, pixels, 1);
     return picture;
@@ -298,7 +298,7 @@ void picture_free(struct picture *picture)
     free(picture->depth);
     free(picture->normal);
     free(picture->source);
-    free(picture->certainty);
+    free(picture->trust);
     free(picture->thickness);
     free(picture->density);
     free(picture->layer_combined);
@@ -341,7 +341,7 @@ void picture_assert_identical(const struct picture *part, const struct picture *
         assert_same_bytes(part->keys, whole->keys, 8, part, whole, x, y, "keys", what);
     assert_same_bytes(part->depth, whole->depth, 4, part, whole, x, y, "depth", what);
     assert_same_bytes(part->source, whole->source, 4, part, whole, x, y, "source", what);
-    assert_same_bytes(part->certainty, whole->certainty, 4, part, whole, x, y, "certainty", what);
+    assert_same_bytes(part->trust, whole->trust, 4, part, whole, x, y, "trust", what);
     assert_same_bytes(part->thickness, whole->thickness, 4, part, whole, x, y, "thickness", what);
     assert_same_bytes(part->density, whole->density, 4, part, whole, x, y, "density", what);
     assert_same_bytes(part->normal, whole->normal, 12, part, whole, x, y, "normal", what);

@@ -214,7 +214,7 @@ static void test_fewer_passes(void **state)
     }
 }
 
-// Each pixel's certainty and thickness are those of the point whose number its key holds, times the instance's scale, and 0
+// Each pixel's trust and thickness are those of the point whose number its key holds, times the instance's scale, and 0
 // where that is a mesh or nothing. scales: of the instances.
 static void check_known(const struct picture *picture, const patina_neighbourhoods *known, uint64_t points, const float *scales,
                         uint32_t instances)
@@ -223,17 +223,17 @@ static void check_known(const struct picture *picture, const patina_neighbourhoo
     for (size_t i = 0; i < (size_t)picture->width * picture->height; i++) {
         const uint64_t id = picture->keys[i] == KEY_EMPTY ? UINT64_MAX : key_id(picture->keys[i]);
         const int shown = id < instances * points;
-        const float certainty = shown ? known->certainty[id % points] : 0.0f;
+        const float trust = shown ? known->trust[id % points] : 0.0f;
         const float sigma = shown ? known->sigma[id % points] * scales[id / points] : 0.0f;
-        assert_float_equal(picture->certainty[i], certainty, 1e-6f);
+        assert_float_equal(picture->trust[i], trust, 1e-6f);
         assert_float_equal(picture->thickness[i], sigma, 1e-6f * sigma);
-        sure += certainty > 0.5f;
+        sure += trust > 0.5f;
         thick += sigma > 0.0f;
     }
     assert_true(sure > 1000 && thick > 1000);
 }
 
-static void test_certainty_and_thickness(void **state)
+static void test_trust_and_thickness(void **state)
 {
     static const char *const scenes[] = {"footprints, density 0.1 to 30", "footprints among meshes",
                                          "footprints without normals, orthographic"};
@@ -248,9 +248,9 @@ static void test_certainty_and_thickness(void **state)
             patina_cloud_info info = {.struct_size = sizeof info};
             CHECK(patina_cloud_get_info(stage.cloud, &info), stage.cloud);
             patina_neighbourhoods known = {.struct_size = sizeof known};
-            known.certainty = calloc(info.count, sizeof *known.certainty);
+            known.trust = calloc(info.count, sizeof *known.trust);
             known.sigma = calloc(info.count, sizeof *known.sigma);
-            assert_true(known.certainty && known.sigma);
+            assert_true(known.trust && known.sigma);
             CHECK(patina_cloud_neighbourhoods(stage.cloud, &known, NULL), stage.cloud);
             for (uint32_t strata = 0; strata < 5; strata += 4) { // what is left out changes what is drawn, not how thick it is
                 stage.settings.strata = strata;
@@ -258,14 +258,14 @@ static void test_certainty_and_thickness(void **state)
                 check_known(&picture, &known, info.count, scales, s == 2 ? 6 : 1);
                 picture_free(&picture);
             }
-            free(known.certainty);
+            free(known.trust);
             free(known.sigma);
             stage_free(&stage);
         }
         struct stage plain = stage_build(staging_named("small, 1 point a pixel")); // nothing is known of its points
         struct picture picture = picture_render(device, plain.scene, &plain.camera, &plain.settings);
         for (size_t i = 0; i < (size_t)picture.width * picture.height; i++)
-            assert_true(picture.certainty[i] == 0.0f && picture.thickness[i] == 0.0f);
+            assert_true(picture.trust[i] == 0.0f && picture.thickness[i] == 0.0f);
         picture_free(&picture);
         stage_free(&plain);
         patina_device_destroy(device);
@@ -655,7 +655,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_view_after_view),
         cmocka_unit_test(test_fewer_passes),
-        cmocka_unit_test(test_certainty_and_thickness),
+        cmocka_unit_test(test_trust_and_thickness),
         cmocka_unit_test(test_statistics),
         cmocka_unit_test(test_plan),
         cmocka_unit_test(test_callers_numbers),

@@ -47,7 +47,7 @@ PICTURES = {
     "soft points, Base": "full --soft base --soft-radius 0.1",
     "soft points, Express": "bare --soft express --soft-radius 0.1",
     "soft points, Concentric": "bare --soft concentric --soft-radius 0.1 --soft-shells 8",
-    "certainty": "bare --pass certainty",
+    "trust": "bare --pass trust",
     "soft points among a surface": "full --lit --soft base --soft-field luminance --soft-threshold 0.5 --soft-radius 0.1",
     "contour lines of an attribute": "full --lit --contour 0.2 --attribute turns --effect contour_source=attribute",
     "a mesh among points": "full --lit --shadows --mesh plate.obj",

@@ -261,7 +261,7 @@ static void *cancel_later(void *context) // within the samples
     return NULL;
 }
 
-// Samples that are cut off leave every pass of the last picture, certainty too, which the samples themselves do not make.
+// Samples that are cut off leave every pass of the last picture, trust too, which the samples themselves do not make.
 static void test_cut_off(void **state)
 {
     (void)state;
@@ -271,18 +271,18 @@ static void test_cut_off(void **state)
     pthread_t thread;
     static float first[64 * 64], then[64 * 64];
     CHECK(patina_cloud_analyse(stage.cloud, NULL, NULL), stage.cloud);
-    stage.settings.passes |= 1u << PATINA_PASS_CERTAINTY;
+    stage.settings.passes |= 1u << PATINA_PASS_TRUST;
     CHECK(patina_scene_set_camera(stage.scene, &stage.camera), stage.scene);
     CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
     CHECK(patina_frame_create(device, &frame), device);
     CHECK(patina_frame_render(frame, stage.scene), frame);
-    CHECK(patina_frame_read(frame, PATINA_PASS_CERTAINTY, first, sizeof first), frame);
+    CHECK(patina_frame_read(frame, PATINA_PASS_TRUST, first, sizeof first), frame);
     stage.settings.pixel_samples = 4096;
     CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
     assert_int_equal(pthread_create(&thread, NULL, cancel_later, frame), 0);
     assert_int_equal(patina_frame_render(frame, stage.scene), PATINA_ERROR_CANCELLED);
     pthread_join(thread, NULL);
-    CHECK(patina_frame_read(frame, PATINA_PASS_CERTAINTY, then, sizeof then), frame);
+    CHECK(patina_frame_read(frame, PATINA_PASS_TRUST, then, sizeof then), frame);
     assert_true(first[64 * 32 + 32] > 0.0f);
     assert_memory_equal(first, then, sizeof first);
     patina_frame_destroy(frame);

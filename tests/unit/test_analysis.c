@@ -123,7 +123,7 @@ static void test_neighbours(void **state)
 // ---- shapes ----------------------------------------------------------------------------------------------------------------
 
 struct read {
-    float *normal, *spacing, *half_axes, *sigma, *certainty, *axis;
+    float *normal, *spacing, *half_axes, *sigma, *trust, *axis;
     uint8_t *kind;
 };
 
@@ -140,7 +140,7 @@ static struct read read_cloud(patina_cloud *cloud)
                                           .spacing = r.spacing,
                                           .half_axes = r.half_axes,
                                           .sigma = r.sigma,
-                                          .certainty = r.certainty,
+                                          .trust = r.trust,
                                           .kind = r.kind};
     CHECK(patina_cloud_neighbourhoods(cloud, &wanted, NULL), cloud);
     return r;
@@ -152,7 +152,7 @@ static void read_free(struct read *r)
     free(r->spacing);
     free(r->half_axes);
     free(r->sigma);
-    free(r->certainty);
+    free(r->trust);
     free(r->axis);
     free(r->kind);
 }
@@ -377,7 +377,7 @@ static void test_words(void **state)
             axis[k] /= sqrt(length);
         struct pt_neighbourhood in = {.kind = 1u + (uint32_t)i % 5u,
                                       .major = exp(pcg_between(&random, 0.0, 9.0)),
-                                      .certainty = 0.4},
+                                      .trust = 0.4},
                                 out;
         in.minor = in.major / exp(pcg_between(&random, 0.0, 2.4));
         in.sigma = 0.3;
@@ -385,7 +385,7 @@ static void test_words(void **state)
         pt_unpack_shape(pt_pack_shape(&in, bits, 1.0), bits, 1.0, &out);
         assert_int_equal(out.kind, in.kind);
         assert_true(fabs(log2(out.major / in.major)) <= 0.126 && fabs(log2(out.minor / in.minor)) <= 0.26);
-        assert_true(fabs(log2(out.sigma / in.sigma)) <= 0.126 && fabs(out.certainty - 0.4) < 1e-9);
+        assert_true(fabs(log2(out.sigma / in.sigma)) <= 0.126 && fabs(out.trust - 0.4) < 1e-9);
         const double turned = fabs(out.axis[0] * axis[0] + out.axis[1] * axis[1] + out.axis[2] * axis[2]);
         assert_true(turned > cos(3.14159265 / 128.0 + 1e-6));
     }

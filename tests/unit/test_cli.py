@@ -115,7 +115,7 @@ def test_analyse_writes_columns():
     assert int(counts["surface"]) > 2900, counts
     header, rows = (FOLDER / "known.ply").read_bytes().split(b"end_header\n")
     names = [line.split()[-1].decode() for line in header.splitlines() if line.startswith(b"property")]
-    assert names == ["x", "y", "z", "nx", "ny", "nz", "spacing", "radius", "radius_minor", "sigma", "certainty", "kind",
+    assert names == ["x", "y", "z", "nx", "ny", "nz", "spacing", "radius", "radius_minor", "sigma", "trust", "kind",
                      "seen_through"], names
     assert b"element vertex 3000" in header and len(rows) % 3000 == 0
     assert "points      3000" in run("info", "known.ply").stdout
@@ -158,10 +158,10 @@ def test_free_space():
     off, shown, used = (at("--free-space", word) for word in ("off", "show", "use"))
     assert off != shown != used != off
     assert sum(pixel[0] > 200 and pixel[1] < 60 for pixel in shown) == 1 and not sum(pixel[1] < 60 < pixel[0] for pixel in used)
-    assert at("--hide-kinds", "surface,border") != off and at("--least-certainty", "1") != off
+    assert at("--hide-kinds", "surface,border") != off and at("--trust", "1") != off
     ball("alone.ply", 1000)
     assert "stations" in run("render", "alone.ply", *FRONT, "-o", "x.png", "--free-space", "use", code=1).stderr
-    for arguments in (["--free-space", "maybe"], ["--hide-kinds", "surface,cheese"], ["--hide-kinds", ""], ["--least-certainty", "2"],
+    for arguments in (["--free-space", "maybe"], ["--hide-kinds", "surface,cheese"], ["--hide-kinds", ""], ["--trust", "2"],
                       ["--free-space", "use", "--analysis", "off"]):
         run("render", "alone.ply", *FRONT, "-o", "x.png", *arguments, code=2)
 
@@ -177,19 +177,19 @@ def test_passes():
 
     _, color = at("--transparent")
     pictures = {}
-    for name in ("depth", "normal", "source", "certainty", "thickness"):
+    for name in ("depth", "normal", "source", "trust", "thickness"):
         said, pictures[name] = at("--transparent", "--pass", name)
         assert ("from" in said) == (name != "normal"), said
         assert [p[3] == 0 for p in pictures[name]] == [p[3] == 0 for p in color] and any(p[3] for p in color)
-    assert "from 0 to 1" in at("--pass", "certainty")[0]
+    assert "from 0 to 1" in at("--pass", "trust")[0]
     shown = [k for k, p in enumerate(color) if p[3]]
     assert len({tuple(pictures[name][k] for k in shown) for name in pictures}) == len(pictures)
     facing = sum(pictures["normal"][k][:3] == (128, 0, 128) for k in shown)  # a wall across y
     assert facing > len(shown) // 2, (facing, len(shown))
-    assert len({pictures["certainty"][k] for k in shown}) > 1
-    narrow = at("--pass", "certainty,0,0.01", "--ramp-colors", "grey")[1]
+    assert len({pictures["trust"][k] for k in shown}) > 1
+    narrow = at("--pass", "trust,0,0.01", "--ramp-colors", "grey")[1]
     assert sum(narrow[k] == (255, 255, 255) for k in shown) > len(shown) // 2
-    for arguments in (["--pass", "cheese"], ["--pass", "certainty,1,0"], ["--pass", "normal,0,1"], ["--pass", "certainty,1"],
+    for arguments in (["--pass", "cheese"], ["--pass", "trust,1,0"], ["--pass", "normal,0,1"], ["--pass", "trust,1"],
                       ["--pass", "thickness", "--analysis", "off"]):
         run("render", "stations.ptx", "-o", "x.png", *arguments, code=2)
     run("render", "stations.ptx", "--pass", "depth", "--repeat", "1", code=2)

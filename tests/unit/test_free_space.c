@@ -235,7 +235,7 @@ static void test_pictures(void **state)
         CHECK(patina_cloud_create(&cloud_desc, NULL, &cloud), NULL);
         const patina_analysis_desc desc = describe(&scan, stations, 0);
         CHECK(patina_cloud_analyse(cloud, &desc, NULL), cloud);
-        const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .kind = kinds, .certainty = certainties};
+        const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .kind = kinds, .trust = certainties};
         CHECK(patina_cloud_neighbourhoods(cloud, &wanted, NULL), cloud);
         for (uint32_t k = 0; k < support_device_count(); k++) {
             patina_device *device = support_device_open(support_device_name(k), 0, 0);
@@ -256,7 +256,7 @@ static void test_pictures(void **state)
             const struct looked bare = look(device, cloud, &style, is_no_surface, marked);
             assert_true(bare.wrong == 0 && bare.others > 0 && bare.others < off.others / 2);
             style.hidden_kinds = 0;
-            style.least_certainty = 0.95f;
+            style.least_trust = 0.95f;
             const struct looked certain = look(device, cloud, &style, is_certain, marked);
             assert_true(certain.wrong == 0 && certain.others > 0 && certain.others < off.others);
             style.hidden_kinds = 63;
@@ -302,7 +302,7 @@ static void test_refusals(void **state)
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_ERROR_ARGUMENT);
     style = (patina_cloud_style){.struct_size = sizeof style, .hidden_kinds = 64};
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_ERROR_ARGUMENT);
-    style = (patina_cloud_style){.struct_size = sizeof style, .least_certainty = NAN};
+    style = (patina_cloud_style){.struct_size = sizeof style, .least_trust = NAN};
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_ERROR_ARGUMENT);
     patina_scene_destroy(scene);
     patina_cloud_destroy(cloud);

@@ -210,6 +210,7 @@ typedef struct patina_cloud_info {
     uint32_t packed;            // 1: of a file that was saved so: patina_save_desc.pack
     uint32_t numbered;          // 1: points are numbered as the file has them: patina_save_desc.drop_order
     double packed_error;        // how far packing moved a position at most, object units
+    uint64_t trusts[16];        // drawn points of each level of trust, where analysed: level l stands for 1 - ((15 - l) / 15)^2
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -241,6 +242,11 @@ enum patina_kind {
 // Where nothing tells the side of a surface, 64 views from outside vote for the one that is seen; sheets face up.
 #define PATINA_SIDES_VOTED 2
 
+// Numbers of patina_analysis_desc.trust_features: scene/trust_features.h lists them.
+#define PATINA_TRUST_FEATURES 33
+// The least trust of points that are drawn by default: at most 1 % of the right samples of any scene for tuning have less.
+#define PATINA_TRUST_DEFAULT 0.78f
+
 typedef struct patina_analysis_desc {
     size_t struct_size;
     uint32_t neighbours;    // 3..64; 0 = 16, and 48 where 16 leave doubts
@@ -265,6 +271,8 @@ typedef struct patina_analysis_desc {
                        // lie in one
     uint32_t direction_count; // with grid, of scans whose beams are parallel, and whose place nobody knows: ...
     const double *directions; // ... in which each looked, 3 each, any length; 0 0 0: it has a station
+    float *trust_features;    // NULL, or PATINA_TRUST_FEATURES numbers of each point, `count` times, in the given order: what its trust
+                              // is found from, to train with. Points that are not drawn read 0. For patina_cloud_analyse
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
@@ -283,7 +291,7 @@ typedef struct patina_neighbourhoods {
     float *half_axes;      // 2 each, of its footprint, the greater first
     float *sigma;          // thickness: noise, and disagreement of scans; 0 = unknown
     uint8_t *kind;         // patina_kind
-    float *certainty;      // 0..1: how well that explains the neighbours
+    float *trust;          // 0..1: the probability that the point is not a wrong sample (a mixed pixel, a stray)
     uint8_t *seen_through; // 1: by some station, see patina_analysis_desc.free_space
     // From the `neighbours` nearest, walked anew for any cloud.
     uint32_t neighbours; // 1..64
@@ -386,7 +394,8 @@ typedef struct patina_cloud_style {
     // Of clouds that were analysed; nothing for others:
     uint32_t free_space;   // patina_free_space: what becomes of what a station saw through
     uint32_t hidden_kinds; // bits 1 << patina_kind: points that are not drawn and cast no shadow
-    float least_certainty; // 0..1: points less certain of their kind are not drawn and cast no shadow
+    float least_trust;     // points of less trust are not drawn and cast no shadow; 0 = PATINA_TRUST_DEFAULT, negative = all are
+                           // drawn. Where no point has as much, all are drawn, too, and the log says so
     float largest_gap;     // world units; no disc is wider, whatever its radius; 0 = as wide as it is
     const patina_mask
         *mask; // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
@@ -643,7 +652,7 @@ PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimu
     X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")                   \
     X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")                              \
     X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")                                   \
-    X(CERTAINTY, 1, "0..1, of the nearest point's kind, as analysed; 0 where nothing is known, or nothing is")                 \
+    X(TRUST, 1, "0..1, of the nearest point, as analysed; 0 where nothing is known, or nothing is")                        \
     X(THICKNESS, 1, "sigma of the nearest point's surface, world units; 0 where nothing is known, or nothing is")              \
     X(DENSITY, 1, "soft points before the surface, for each square of the world's unit across the pixel's ray; 0 without any") \
     X(DISAGREEMENT, 1, "of range images: how far apart the scans lie there along the normal, world units; 0: only one is there")
@@ -701,6 +710,7 @@ typedef struct patina_frame_stats {
     uint64_t
         points_lost; // of mapped files that cannot be read any more, cut short or on a disk that is gone: they are not drawn. A line
                      // of the log names each such file once
+    uint64_t untrusted; // points of the scene that are left out for their trust: patina_cloud_style.least_trust
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
