@@ -226,6 +226,43 @@ def test_one_value_for_all():
     check_close(attributes._values(One(), 5), np.full((5, 1), 7.0), 0, "one value")
 
 
+def test_files_hold_point_clouds():
+    """Saved, appended, linked and overridden: the picture stays."""
+    needs_clouds()
+    new_scene()
+    obj = added(given(), True)
+    before = render()
+    path = str(SCRATCH / "clouds.blend")
+    bpy.data.libraries.write(path, {obj})
+    for link in (False, True):
+        new_scene()
+        with bpy.data.libraries.load(path, link=link) as (there, wanted):
+            wanted.objects = list(there.objects)
+        found, = wanted.objects
+        bpy.context.scene.collection.objects.link(found)
+        same(before, render(), f"link {link}")
+        bpy.context.view_layer.objects.active = found
+        why = convert_points.why_not(found, 'MESH')
+        check(why == ("the object belongs to another file" if link else ""), f"link {link}: {why}")
+        if link:
+            own = found.override_create(remap_local_usages=True)
+            same(before, render(), "overridden")
+            own.patina.opacity = 0.5
+            check(not np.array_equal(render()["Combined"], before["Combined"]), "the override's own opacity changes nothing")
+    for library in list(bpy.data.libraries):
+        bpy.data.libraries.remove(library)
+
+
+def test_point_clouds_become_links():
+    needs_clouds()
+    new_scene()
+    obj = added(given(), True)
+    path = SCRATCH / "linked.ply"
+    check(bpy.ops.object.patina_mesh_to_linked(filepath=str(path)) == {'FINISHED'}, "not linked")
+    check(obj.type == 'MESH' and obj.patina.linked_file and len(obj.data.vertices) == 8, f"{obj.type} {obj.patina.linked_file}")
+    check(len(drawn(render())) > 500 and not reports, f"{reports}")
+
+
 def test_material_shows_the_colors():
     """In other engines, as in Material Preview."""
     needs_clouds()
