@@ -198,8 +198,11 @@ def local_spacing(positions: np.ndarray) -> np.ndarray:
         taken = np.count_nonzero(np.bincount(cells, minlength=size))
         cell = min(cell * float(np.sqrt(_IN_CELL * taken / len(few))), extent)
     cell *= float(np.sqrt(len(few) / finite.sum()))
-    cells, size = _cells(positions, lower, cell)
-    return (np.float32(cell) / np.sqrt(np.maximum(np.bincount(cells, minlength=size), 1), dtype=np.float32))[cells]
+    most = np.ones(len(positions), np.float32)
+    for shift in (0.0, 0.5):  # a cell at the edge of a surface, or cut by it, holds few: one of another grid may not
+        cells, size = _cells(positions, lower - np.float32(shift * cell), cell)
+        np.maximum(most, np.bincount(cells, minlength=size)[cells], out=most, casting='unsafe')
+    return np.float32(cell) / np.sqrt(most)
 
 
 def _cells(positions: np.ndarray, lower: np.ndarray, cell: float) -> tuple[np.ndarray, int]:

@@ -85,7 +85,7 @@ class Shown:
     clouds: list[sync.CloudItem]  # built
     color: np.ndarray  # (height, width, 4), premultiplied, scene-linear; the next picture but one overwrites it
     depth: np.ndarray  # (height, width, 1), linear z; nearer where points lie that the picture leaves out and Blender draws
-    hiding: np.ndarray  # the same, far away where Blender draws a depth of its own; behind it overlays are hidden
+    hiding: np.ndarray | None  # the same, far away where Blender draws a depth of its own; behind it overlays are hidden. None: nowhere
     behind: sync.World | None  # what lies behind it
     pixel: float  # its width, at distance 1 in perspective
     place: tuple[float, float, float, float]  # of the viewport that it covers, 0..1
@@ -294,8 +294,9 @@ class Viewport:
                 self.pace.seen(time.monotonic() - self.shown.wish.asked - self.shown.stats["ms"] / 1000.0)
             same = self._drawn and self._drawn[0].depth is self.shown.depth
             self._drawn = (self.shown, _upload(self.shown), self._drawn[2] if same else None)
-        if shows_overlays and self._drawn[2] is None:
-            self._drawn = (*self._drawn[:2], graphics.texture(_covering(self.shown.hiding), 'R32F'))
+        hides = shows_overlays and (self.shown.hiding is not None or self._chosen is not None)
+        if hides and self._drawn[2] is None:
+            self._drawn = (*self._drawn[:2], graphics.texture(_covering(self.shown.depth if self.shown.hiding is None else self.shown.hiding), 'R32F'))
         shown, color, _ = self._drawn
         corners = [2.0 * share - 1.0 for share in shown.place]
         gpu.state.depth_test_set('NONE')
@@ -306,7 +307,7 @@ class Viewport:
             gpu.state.blend_set('ALPHA_PREMULT')
         _fill_rectangle(corners, 'EXACT' if shown.wish.level.shrink == 1 else 'SMOOTH', color)
         gpu.state.blend_set('NONE')
-        if not shows_overlays:
+        if not hides:
             return
         if overlays.KEEPS_DEPTH:
             self._hide_overlays(context, 'DEPTH')
@@ -338,7 +339,7 @@ class Viewport:
         if self._closed or self._drawn is None or self._drawn[2] is None:
             return
         try:
-            if not overlays.KEEPS_DEPTH:
+            if not overlays.KEEPS_DEPTH and self._drawn[0].hiding is not None:
                 gpu.state.blend_set('NONE')
                 self._hide_overlays(context, 'ERASE')
                 overlays.draw_marks(context)
@@ -517,7 +518,8 @@ class Viewport:
         for beside, other in parts[1:]:
             colors += yield from self._draw_frame(beside, other, ("COMBINED",), [])
         hiding = self._without_own(frame, description, depth)
-        yield from self._hide_dots(device, dots.left_out(description, wish.clips), hiding)
+        if hiding is not None:
+            yield from self._hide_dots(device, dots.left_out(description, wish.clips), hiding)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         if not self._many or wish.detail == pace.MOVING:  # that of others says nothing of pictures while the view moves
@@ -530,13 +532,14 @@ class Viewport:
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.label)
 
-    def _without_own(self, frame: native.Frame, description: sync.SceneDescription, depth: np.ndarray) -> np.ndarray:
-        """The depth, far away where a pixel shows what Blender's overlays draw a depth of: PointCloud objects and faces."""
+    def _without_own(self, frame: native.Frame, description: sync.SceneDescription, depth: np.ndarray) -> np.ndarray | None:
+        """The depth, far away where a pixel shows what Blender's overlays draw a depth of: PointCloud objects and faces. None: they draw
+        that of all."""
         own = [*(item.blender_depth for item in description.clouds), *(True for _ in description.meshes)]
         if overlays.KEEPS_DEPTH or not any(own):
             return depth
         if all(own):
-            return np.full_like(depth, FAR)
+            return None
         x0, y0, x1, y1 = description.settings.region
         shown = cryptomatte.shown_items(frame.read_numbers(), description)
         shown = shown if shown.shape == depth.shape[:2] else shown[y0:y1, x0:x1]

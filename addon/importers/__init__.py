@@ -20,8 +20,8 @@ __all__ = ["FORMATS", "Filter", "Pieces", "PointFile", "Progress", "in_pieces", 
 
 # One colour and one normal attribute, under names that every Blender from 3.4 on allows ("normal" is reserved
 # before 4.0) and that sync.attributes looks for.
-COLOR_NAME = "Col"  # of meshes
-CLOUD_COLOR_NAME = "color"  # of PointClouds, as Blender's own tools name it
+# Not "color": of a PointCloud, Cycles 4.5 to 5.2 shows an attribute of that name black.
+COLOR_NAME = "Col"
 NORMAL_NAME = "Normal"
 
 # What Blender takes bytes as: as they are from 4.2 on (0.1 ms a million), before that rather as wider ones (25 ms, bytes 55).
@@ -74,9 +74,8 @@ def to_data(points: PointFile, cloud: bool) -> bpy.types.ID:
     data = point_data.new(told(points.name), points.positions, cloud)
     places = points.positions if cloud and point_data.RADIUS not in points.scalars else None
     points.positions = points.positions[:0].copy()
-    name = CLOUD_COLOR_NAME if cloud else COLOR_NAME
     if points.colors is not None:
-        name = _add_colors(data, name, points.colors)
+        name = _add_colors(data, points.colors)
         points.colors = None
         if cloud:
             data.materials.append(point_data.color_material(name))
@@ -93,13 +92,13 @@ def to_data(points: PointFile, cloud: bool) -> bpy.types.ID:
     return data
 
 
-def _add_colors(data: bpy.types.ID, name: str, colors: np.ndarray) -> str:
+def _add_colors(data: bpy.types.ID, colors: np.ndarray) -> str:
     """Returns the name of the attribute."""
     if colors.dtype == np.uint8:
-        attribute = _add(data, name, 'BYTE_COLOR')
+        attribute = _add(data, COLOR_NAME, 'BYTE_COLOR')
         attribute.data.foreach_set("color_srgb", (colors / np.float32(255)).reshape(-1))
     else:
-        attribute = _add(data, name, 'FLOAT_COLOR')
+        attribute = _add(data, COLOR_NAME, 'FLOAT_COLOR')
         attribute.data.foreach_set("color", colors.reshape(-1))
     name = attribute.name
     if hasattr(data.color_attributes, "active_color"):  # of meshes

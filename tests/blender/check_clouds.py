@@ -4,7 +4,7 @@ both, and odd ones cause one clear message or none."""
 
 import bpy
 import numpy as np
-from harness import SCRATCH, Skip, add_points, check, check_close, color_name, drawn, new_scene, points_of, render, reports, sphere
+from harness import SCRATCH, Skip, add_points, check, check_close, drawn, new_scene, points_of, render, reports, saved, set_world, sphere
 from patina import importers, point_data
 from patina.importers import PointFile
 from patina.operators import convert_points
@@ -54,7 +54,7 @@ def test_imports_make_what_is_asked_for():
         bpy.ops.import_scene.patina_points(filepath=str(path), kind=kind)
         obj = bpy.context.object
         check(obj.type == wanted and obj.select_get(), f"{kind}: {obj.type}")
-        check(len(points_of(obj)) == 200 and color_name(obj) in obj.data.attributes, f"{kind}: {obj.data.attributes.keys()}")
+        check(len(points_of(obj)) == 200 and "Col" in obj.data.attributes, f"{kind}: {obj.data.attributes.keys()}")
         check(not any(name in obj.data.attributes for name in point_data.SELECTION), f"{kind}: {obj.data.attributes.keys()}")
         check([item.name for item in bpy.data.objects if item.name.endswith("mesh")] == [], "a helper object stays")
         bpy.ops.object.patina_frame_points()
@@ -186,14 +186,14 @@ def test_odd_point_clouds():
     new_scene()
     empty = bpy.data.objects.new("empty", bpy.data.pointclouds.new("empty"))
     bpy.context.scene.collection.objects.link(empty)
-    obj = added(given(500, radius=np.full(500, 3, np.uint8), position=np.ones(500, np.float32), color=np.ones(500, np.float32)), True)
+    obj = added(given(500, radius=np.full(500, 3, np.uint8), position=np.ones(500, np.float32), Col=np.ones(500, np.float32)), True)
     for kind in ('FLOAT2', 'QUATERNION', 'FLOAT4X4', 'BOOLEAN', 'INT16_2D', 'INT32_2D', 'FLOAT4'):
         try:
             obj.data.attributes.new(f"odd {kind}", kind, 'POINT')
         except (TypeError, RuntimeError):
             pass  # not of this Blender, or not for points
     names = obj.data.attributes.keys()
-    check({"file_position", "file_color"} <= set(names), f"clashing names: {names}")
+    check({"file_position", "file_Col"} <= set(names), f"clashing names: {names}")
     check_close(attributes.scalars(obj.data, 500, "radius")[:, 0], np.full(500, 3.0), 0, "a file's radii")
     check(not point_data.are_for_display(obj.data), "a file's radii count as for display")
     check(len(drawn(render())) > 100 and not reports, f"{reports}")
@@ -224,6 +224,65 @@ def test_one_value_for_all():
 
         data = data()
     check_close(attributes._values(One(), 5), np.full((5, 1), 7.0), 0, "one value")
+
+
+def test_files_hold_point_clouds():
+    """Saved, appended, linked and overridden: the picture stays."""
+    needs_clouds()
+    new_scene()
+    obj = added(given(), True)
+    before = render()
+    path = str(SCRATCH / "clouds.blend")
+    bpy.data.libraries.write(path, {obj})
+    for link in (False, True):
+        new_scene()
+        with bpy.data.libraries.load(path, link=link) as (there, wanted):
+            wanted.objects = list(there.objects)
+        found, = wanted.objects
+        bpy.context.scene.collection.objects.link(found)
+        same(before, render(), f"link {link}")
+        bpy.context.view_layer.objects.active = found
+        why = convert_points.why_not(found, 'MESH')
+        check(why == ("the object belongs to another file" if link else ""), f"link {link}: {why}")
+        if link:
+            own = found.override_create(remap_local_usages=True)
+            same(before, render(), "overridden")
+            own.patina.opacity = 0.5
+            check(not np.array_equal(render()["Combined"], before["Combined"]), "the override's own opacity changes nothing")
+    for library in list(bpy.data.libraries):
+        bpy.data.libraries.remove(library)
+
+
+def test_point_clouds_become_links():
+    needs_clouds()
+    new_scene()
+    obj = added(given(), True)
+    path = SCRATCH / "linked.ply"
+    check(bpy.ops.object.patina_mesh_to_linked(filepath=str(path)) == {'FINISHED'}, "not linked")
+    check(obj.type == 'MESH' and obj.patina.linked_file and len(obj.data.vertices) == 8, f"{obj.type} {obj.patina.linked_file}")
+    check(len(drawn(render())) > 500 and not reports, f"{reports}")
+
+
+def test_material_shows_the_colors():
+    """In other engines, as in Material Preview."""
+    needs_clouds()
+    scene = new_scene()
+    try:
+        scene.render.engine = 'CYCLES'
+    except TypeError:
+        raise Skip("this Blender has no Cycles") from None
+    points = given()
+    points.colors = np.tile(np.uint8((250, 10, 10, 255)), (3000, 1))
+    obj = added(points, True)
+    again = importers.to_data(given(), True)
+    check(again.materials[0] == obj.data.materials[0] and len(bpy.data.materials) == 1, "a material for each import")
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.device = 4, False, 'CPU'
+    set_world((1.0, 1.0, 1.0))
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    bpy.ops.render.render()
+    seen = saved().reshape(-1, 4)
+    seen = seen[seen[:, 3] > 0.9]
+    check(len(seen) > 10 and (seen[:, 0] > 5 * seen[:, 1]).all(), f"{len(seen)} pixels, {seen[:3]}")
 
 
 def test_local_spacing():

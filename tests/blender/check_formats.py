@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from check_import import attribute_of, positions_of
 from check_import import import_ply as import_points
-from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, color_name, drawn, new_scene, points_of, render
+from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, drawn, new_scene, points_of, render
 from patina import exporters, importers, native, readers
 from patina.importers import e57, las, pcd, reading, scans
 
@@ -60,7 +60,7 @@ def test_text():
     new_scene()
     obj, = import_points(text_file("a.xyz", "".join(f"{x / 9 - 1} {y / 9 - 1} -4 255 {x} 0\n" for x in range(18)
                                                      for y in range(18))))
-    check(obj.data.attributes[color_name(obj)].data_type == 'BYTE_COLOR', "no byte colours")
+    check(obj.data.attributes["Col"].data_type == 'BYTE_COLOR', "no byte colours")
     check(len(drawn(render())) > 200, "not drawn")
     obj, = import_points(text_file("b.csv", "x,y,z,intensity\n500000.5,4100000.25,7,3\n500001.5,4100000.25,7,4\n"))
     places = np.array(obj["patina_origin"]) + points_of(obj)
@@ -325,7 +325,7 @@ def test_real_las():
     new_scene()
     obj, = import_points(path)
     check(len(points_of(obj)) == 110000, f"{len(points_of(obj))} points")
-    check(obj.data.attributes[color_name(obj)].data_type == 'BYTE_COLOR', "8-bit colours in 16 bits stay bytes")
+    check(obj.data.attributes["Col"].data_type == 'BYTE_COLOR', "8-bit colours in 16 bits stay bytes")
     check({"intensity", "gps_time", "return_number"} <= set(obj.data.attributes.keys()), f"{obj.data.attributes.keys()}")
     header = las.read_header(path)
     places = np.array(obj["patina_origin"]) + positions_of(obj) - np.array(obj.matrix_world.translation)
@@ -420,7 +420,7 @@ def test_pcd():
         path.write_bytes(header.encode() + form.encode() + b"\n" + body)
         obj, = import_points(path)
         check_close(positions_of(obj), [(1, 3, 0), (2, 4, 0)], 0, form)
-        check_close(attribute_of(obj, color_name(obj), "color_srgb", 4) * 255, [(255, 128, 1, 255), (0, 1, 2, 255)], 1e-3, form)
+        check_close(attribute_of(obj, "Col", "color_srgb", 4) * 255, [(255, 128, 1, 255), (0, 1, 2, 255)], 1e-3, form)
 
 
 def test_organised_pcd():

@@ -3,7 +3,7 @@
 
 import bpy
 import numpy as np
-from harness import SCRATCH, check, check_close, color_name, drawn, linear, new_scene, points_of, render
+from harness import SCRATCH, check, check_close, drawn, linear, new_scene, points_of, render
 
 COUNT = 500
 
@@ -66,9 +66,9 @@ def attribute_of(obj, name, key, components=1):
 
 
 def check_attributes(obj, data):
-    color = obj.data.attributes[color_name(obj)]
+    color = obj.data.attributes["Col"]
     check((color.data_type, color.domain) == ('BYTE_COLOR', 'POINT'), "8-bit colours stay 8-bit")
-    rgb = attribute_of(obj, color_name(obj), "color_srgb", 4)
+    rgb = attribute_of(obj, "Col", "color_srgb", 4)
     check(np.array_equal(np.rint(rgb[:, :3] * 255), values(data, "red", "green", "blue")), "colours")
     check((rgb[:, 3] == 1).all(), "alpha of files without one")
     if obj.type == 'MESH':  # a PointCloud has none that is active
@@ -133,8 +133,8 @@ def test_float_colors():
     new_scene()
     data = columns()[:3] + [(channel, "f4", np.linspace(0, 1, COUNT)) for channel in ("red", "green", "blue")]
     obj, = import_ply(write_ply("float.ply", data))
-    check(obj.data.attributes[color_name(obj)].data_type == 'FLOAT_COLOR', "float colours stay float")
-    check_close(attribute_of(obj, color_name(obj), "color", 4)[:, 1], np.linspace(0, 1, COUNT), 1e-6, "linear colours")
+    check(obj.data.attributes["Col"].data_type == 'FLOAT_COLOR', "float colours stay float")
+    check_close(attribute_of(obj, "Col", "color", 4)[:, 1], np.linspace(0, 1, COUNT), 1e-6, "linear colours")
 
 
 def test_sixteen_bit_colors():
@@ -142,14 +142,14 @@ def test_sixteen_bit_colors():
     ramp = np.arange(COUNT) * 131
     data = columns()[:3] + [(channel, "u2", ramp) for channel in ("red", "green", "blue")]
     obj, = import_ply(write_ply("deep.ply", data))
-    check_close(attribute_of(obj, color_name(obj), "color", 4)[:, 2], linear(ramp / 257), 1e-5, "16-bit colours")
+    check_close(attribute_of(obj, "Col", "color", 4)[:, 2], linear(ramp / 257), 1e-5, "16-bit colours")
 
 
 def test_bare_positions():
     new_scene()
     data = columns()[:3]
     obj, = import_ply(write_ply("bare.ply", data))
-    check(color_name(obj) not in obj.data.attributes and "Normal" not in obj.data.attributes, "no invented attributes")
+    check("Col" not in obj.data.attributes and "Normal" not in obj.data.attributes, "no invented attributes")
 
 
 def test_awkward_scalar_names():

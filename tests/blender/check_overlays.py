@@ -10,7 +10,7 @@ import numpy as np
 import screen
 from harness import add_points, check, sphere
 from mathutils import Quaternion
-from patina import viewport
+from patina import point_data, viewport
 from window import area, setup, view, window_region
 
 DARK = 40  # of 255: no channel of points and background is below 140
@@ -58,12 +58,12 @@ def view_pixels():
     return part[height // 4:3 * height // 4, width // 4:3 * width // 4]
 
 
-def do(operator, place=None, **options):
+def do(operator, *how, place=None, **options):
     window = bpy.context.window_manager.windows[0]
     place = place or area()
     region = next(region for region in place.regions if region.type == 'WINDOW')
     with bpy.context.temp_override(window=window, screen=window.screen, area=place, region=region):
-        operator(**options)
+        operator(*how, **options)
 
 
 def bright_scene():
@@ -107,7 +107,7 @@ def changes(scene, points):
 
     def close():
         views = [place for place in bpy.context.window.screen.areas if place.type == 'VIEW_3D']
-        do(bpy.ops.screen.area_close, min(views, key=lambda place: place.width))
+        do(bpy.ops.screen.area_close, place=min(views, key=lambda place: place.width))
 
     def mesh():
         points.data.attributes["Col"].data.foreach_set("color_srgb", np.tile(np.float32([0.9, 0.8, 0.6, 1]), len(points.data.vertices)))
@@ -222,7 +222,7 @@ def test_a_new_size_shows_no_stretched_picture():
             do(operator, **options)
             yield at_rest()
         views = [place for place in bpy.context.window.screen.areas if place.type == 'VIEW_3D']
-        do(bpy.ops.screen.area_close, min(views, key=lambda place: place.width))
+        do(bpy.ops.screen.area_close, place=min(views, key=lambda place: place.width))
         yield at_rest()
     finally:
         viewport.RESIZED, viewport.Viewport._draw_picture = waits, drawn
@@ -259,6 +259,34 @@ def test_edit_mode_shows_what_is_selected():
     check(every > 20000 and 2000 < some[0] < every / 2 and none[0] < 2000, f"all, some and none selected: {counts} orange and dark pixels")
     check(max(some[1], none[1]) < LETTERS, f"some and none selected: {counts} orange and dark pixels")
     check(dark_pixels() < LETTERS, f"{dark_pixels()} dark pixels after Edit Mode")
+
+
+def test_point_clouds_show_no_dots():
+    """Converted, with one step of undo: selected or not, nothing but an outline covers the image, and an empty within is hidden."""
+    if not point_data.HAS_CLOUDS:
+        return
+    _, points = bright_scene()
+    bpy.context.view_layer.objects.active = points
+    points.select_set(True)
+    bpy.ops.ed.undo_push(message="Points")
+    do(bpy.ops.object.patina_to_point_cloud, 'EXEC_DEFAULT', True)
+    empty = bpy.data.objects.new("empty", None)
+    empty.empty_display_type, empty.empty_display_size = 'CUBE', 0.3
+    bpy.context.scene.collection.objects.link(empty)
+    name, counts = points.name, []
+    for selected in (False, True):
+        points.select_set(selected)
+        empty.select_set(False)
+        area().tag_redraw()
+        yield at_rest()
+        counts.append((orange_pixels(), dark_pixels()))
+    check(points.type == 'POINTCLOUD' and max(dark for _, dark in counts) < LETTERS, f"orange and dark pixels: {counts}")
+    check(counts[0][0] < 2000 and counts[1][0] < 8000, f"orange and dark pixels: {counts}")
+    bpy.data.objects.remove(empty)
+    do(bpy.ops.ed.undo)
+    points = bpy.data.objects[name]
+    check(points.type == 'MESH' and len(points.data.vertices) == 60000, f"after undo: {points.type}")
+    yield at_rest()
 
 
 def wide_scene():

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from check_formats import range_image, text_file
 from check_import import import_ply, write_ply
-from harness import SCRATCH, check, check_close, color_name, drawn, new_scene, render
+from harness import SCRATCH, check, check_close, drawn, new_scene, render
 from patina import point_data
 from patina.operators import stations
 
@@ -123,7 +123,7 @@ def test_meshes_are_graded():
     after = render()["Combined"]
     check(right.sum() > 100 and left.sum() > 100 and (after[left] == before[left]).all(), "scan 0 stays")
     check_close(after[right][:, :3], 0.5 * before[right][:, :3], 0.005, "half as bright")
-    colors = obj.data.attributes[color_name(obj)].data
+    colors = obj.data.attributes["Col"].data
     colors.foreach_set("color_srgb", np.tile(np.float32((1, 1, 1, 1)), len(colors)))
     point_data.changed(obj.data)
     check_close(render()["Combined"][right][:, :3], np.full((right.sum(), 3), 0.5), 0.005, "of new colors")

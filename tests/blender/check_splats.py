@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from check_import import import_ply, write_ply
 from check_points import grid, pixel
-from harness import SCRATCH, Skip, add_points, check, check_close, color_name, drawn, linear, new_scene, render, reports
+from harness import SCRATCH, Skip, add_points, check, check_close, drawn, linear, new_scene, render, reports
 from patina import importers
 from patina.sync import attributes, splats
 
@@ -145,7 +145,7 @@ def test_files_of_splats():
         scene = new_scene(192, 144)
         scene.patina.surface = 'SPLATS'
         obj, = import_ply(path, link=link)
-        check(link or set(obj.data.attributes.keys()) >= {"opacity", "radius", "Normal", color_name(obj)}
+        check(link or set(obj.data.attributes.keys()) >= {"opacity", "radius", "Normal", "Col"}
               and not [name for name in obj.data.attributes.keys() if name.startswith(("f_", "rot_", "scale_"))], "what is kept of them")
         check_discs(scene, "linked" if link else "imported")
 

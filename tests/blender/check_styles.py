@@ -7,7 +7,7 @@ import os
 
 import bpy
 import numpy as np
-from harness import SCRATCH, add_light, add_points, check, check_close, color_name, new_scene, render, reports, set_world, sphere
+from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, render, reports, set_world, sphere
 from mathutils import Matrix
 from patina import sample, styles, thumbnails
 
@@ -295,7 +295,7 @@ def test_studio_light():
     scene = new_scene(64, 64)
     obj = add_points(*sphere(60000, center=(0, 0, 0)))
     obj.patina.lighting, obj.patina.color = 'LIT', (1, 1, 1)
-    obj.data.attributes.remove(obj.data.attributes[color_name(obj)])
+    obj.data.attributes.remove(obj.data.attributes["Col"])
     studio = scene.patina.studio
     studio.use_light, studio.fill, studio.ambient, studio.height = True, 0.0, (0, 0, 0), 0.0
     studio.strength, scene.patina.use_shadows = np.pi, False

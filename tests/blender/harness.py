@@ -59,7 +59,7 @@ def load_addon():
 
 
 patina = load_addon()
-from patina import engine, importers, passes, point_data  # noqa: E402
+from patina import engine, passes, point_data  # noqa: E402
 from patina.sync import attributes  # noqa: E402
 
 reports: list[tuple[str, str]] = []  # (kind, message) of the last render
@@ -108,7 +108,7 @@ _status, _Engine._status = _Engine._status, _record_status
 def new_scene(width=64, height=48):
     """Empties the file; a camera at the origin that looks down -z, no filters, transparent film, all passes."""
     for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.pointclouds, bpy.data.lights, bpy.data.cameras, bpy.data.worlds,
-                       bpy.data.collections, bpy.data.node_groups):
+                       bpy.data.collections, bpy.data.node_groups, bpy.data.materials):
         for item in list(collection):
             collection.remove(item)
     old = list(bpy.data.scenes)
@@ -185,11 +185,6 @@ def points_of(obj):
     """(n, 3) float32: an object's own points, of a mesh or a PointCloud."""
     count = point_data.count_of(obj.data)
     return attributes.positions(obj.data, count) if count else np.zeros((0, 3), np.float32)
-
-
-def color_name(obj):
-    """The attribute that an import gives its colors."""
-    return importers.CLOUD_COLOR_NAME if obj.type == 'POINTCLOUD' else importers.COLOR_NAME
 
 
 # ---- pictures ------------------------------------------------------------------------------------------------
