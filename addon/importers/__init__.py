@@ -44,7 +44,7 @@ def reader(path: Path) -> ModuleType:
         raise PatinaError("the points of EPT folders are read as pictures want them, not whole: turn Link on", -5)
     if name is None:
         raise PatinaError(f"'{path.suffix}' is none of {' '.join(FORMATS)}", -5)
-    regular(path)
+    regular(path)  # raises where it is no file
     return import_module(f"{__name__}.{name}")
 
 

@@ -30,7 +30,7 @@ POLL = 0.001  # seconds between two looks for the head of a file
 MEMORY_SHARE = 0.5  # of what is free, for points that arrived
 
 # How the process that reads waits for servers; tests are in a hurry.
-TIMEOUT, WAIT = 20.0, 0.5
+TIMEOUT, WAIT = 10.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -245,11 +245,14 @@ class Stream:
             self._process.stdin.flush()
 
 
+_python = programs.python
+
+
 def _finish(process: subprocess.Popen, folder: tempfile.TemporaryDirectory) -> None:
     with contextlib.suppress(OSError):
         process.stdin.close()
     try:
-        process.wait(0.5)
+        process.wait(0.1)  # it may read from a server; what it leaves half-written nobody takes
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()

@@ -7,15 +7,22 @@ A node's points are a sample of its cube; those of all nodes over a place togeth
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from source import Source, SourceError
+from source import Pace, Source, SourceError
 
-MOST_NODES = 1 << 23
+# Budgets of a file. Ten billion points in nodes of 65,000 are 150,000 nodes.
+MOST_NODES = 1 << 21
+MOST_PAGES = 10_000  # of the hierarchy
+MOST_HEAD = 1 << 24  # bytes before the points
 MOST_POINTS = 1 << 24  # of a node: more is no octree
+PACKED = 2  # times the bytes of its records, and EXTRA bytes: more than a node ever takes when it is packed
+EXTRA = 4096
+A_POINT = 40  # bytes, of the columns that are made of a point, twice
 _INFO = 160  # bytes of its record
 ENTRY = np.dtype([("key", "<i4", 4), ("offset", "<u8"), ("size", "<i4"), ("count", "<i4")])
 
@@ -70,10 +77,10 @@ def read_tree(source: Source) -> Tree:
     if fields is None or not np.isfinite(numbers).all() or center_half_gap[3] <= 0 or center_half_gap[4] <= 0 or (scale <= 0).any():
         raise SourceError("its head is damaged: point format, scale, box or octree are none")
     more = record_size - np.dtype(fields).itemsize
-    if more < 0 or header_size != 375 or data_offset > 1 << 28:
-        raise SourceError("its head is damaged: records are too short, or the points lie nowhere")
+    if more < 0 or header_size != 375 or not 375 <= data_offset <= MOST_HEAD:
+        raise SourceError(f"its head is damaged: records of {record_size:,} bytes are too short, or points at byte {data_offset:,} lie nowhere")
     laszip, wkt = _records(source, data_offset, records)
-    nodes = _hierarchy(source, root, root_size)
+    nodes = _hierarchy(source, root, root_size, record_size)
     parents, cubes, gaps = arrange(nodes, np.array(center_half_gap[:3]), center_half_gap[3], center_half_gap[4])
     origin = origin_of(lower, upper, float(scale.min()))
     grown = np.tile(np.array([-1, 1])[:, None] * scale, 1).reshape(1, 6)  # points are rounded to the scale
@@ -105,23 +112,31 @@ def _records(source: Source, end: int, count: int) -> tuple[bytes, str]:
     return laszip, wkt
 
 
-def _hierarchy(source: Source, root: int, root_size: int) -> np.ndarray:
+def _hierarchy(source: Source, root: int, root_size: int, record_size: int) -> np.ndarray:
     """Entries of all nodes with points, by their key."""
     pages, found, seen, total = [(root, root_size)], [], set(), 0
+    pace = Pace(MOST_PAGES, ENTRY.itemsize * (MOST_NODES + MOST_PAGES))
     while pages:
         offset, size = pages.pop()
         if offset in seen or offset > 1 << 60 or size <= 0 or size % ENTRY.itemsize or size > ENTRY.itemsize * MOST_NODES:
             raise SourceError("its octree is damaged: a page of the hierarchy lies nowhere, or twice")
         seen.add(offset)
         entries = np.frombuffer(source.read(offset, size), ENTRY)
+        pace.add(size)
+        if len(pages) + len(seen) + int((entries["count"] == -1).sum()) > MOST_PAGES:
+            raise SourceError(f"its octree is damaged: its hierarchy has more than {MOST_PAGES:,} pages")
         pages += [(int(entry["offset"]), int(entry["size"])) for entry in entries[entries["count"] == -1]]
         found.append(entries[entries["count"] > 0])
         total += len(found[-1])
         if total > MOST_NODES:
-            raise SourceError("its octree is damaged: it has too many nodes")
+            raise SourceError(f"its octree is damaged: it has more than {MOST_NODES:,} nodes")
     nodes = np.concatenate(found)
     if not len(nodes) or (nodes["size"] <= 0).any() or (nodes["count"] > MOST_POINTS).any():
         raise SourceError("its octree is damaged: a node has no points, or too many")
+    most = PACKED * record_size * nodes["count"].astype(np.int64) + EXTRA
+    if (nodes["size"] > most).any():
+        worst = nodes[np.argmax(nodes["size"] > most)]
+        raise SourceError(f"its octree is damaged: a node of {worst['count']:,} points takes {worst['size']:,} bytes")
     return in_order(nodes)
 
 
@@ -147,18 +162,45 @@ def arrange(nodes: np.ndarray, center: np.ndarray, half: float, gap: float) -> t
     depth = keys[:, 0]
     if depth.min() < 0 or depth.max() > 30 or (keys[:, 1:] < 0).any() or (keys[:, 1:] >= (1 << depth)[:, None]).any():
         raise SourceError("its octree is damaged: a node lies outside of it")
-    places = {tuple(key): index for index, key in enumerate(keys.tolist())}
-    if len(places) != len(keys):
-        raise SourceError("its octree is damaged: a node is there twice")
-    parents = np.empty(len(keys), np.int64)
-    for index, (level, *at) in enumerate(keys.tolist()):
-        parents[index] = -1
-        while level > 0 and parents[index] < 0:  # nodes without points are none
-            level, at = level - 1, [value >> 1 for value in at]
-            parents[index] = places.get((level, *at), -1)
+    parents = _parents(keys)
     side = 2.0 * half / (1 << depth)
     lower = center - half + keys[:, 1:] * side[:, None]
     return parents, np.hstack([lower, lower + side[:, None]]), gap / (1 << depth)
+
+
+def _parents(keys: np.ndarray) -> np.ndarray:
+    """The nearest node above each one that has points; -1: there is none. SourceError where a node is there twice."""
+    odd = np.frombuffer(os.urandom(24), np.uint64) | np.uint64(1)  # nobody can make keys of one number
+    found = np.full(len(keys), -1, np.int64)
+    above: list[tuple[np.ndarray, np.ndarray]] = []  # by level: sorted numbers of keys, and the nodes they are of
+    for level in range(int(keys[:, 0].max()) + 1):
+        own = np.flatnonzero(keys[:, 0] == level)
+        waiting, places = own, keys[own, 1:]
+        for higher in reversed(range(level)):
+            places = places >> 1
+            numbers, nodes = above[higher]
+            if len(numbers) and len(waiting):
+                at = np.minimum(np.searchsorted(numbers, _numbers(places, odd)), len(numbers) - 1)
+                there = (keys[nodes[at], 1:] == places).all(axis=1)
+                found[waiting[there]] = nodes[at[there]]
+                waiting, places = waiting[~there], places[~there]
+        numbers = _numbers(keys[own, 1:], odd)
+        order = np.argsort(numbers)
+        if (np.diff(numbers[order]) == 0).any():
+            raise SourceError("its octree is damaged: a node is there twice")
+        above.append((numbers[order], own[order]))
+    return found
+
+
+def _numbers(places: np.ndarray, odd: np.ndarray) -> np.ndarray:
+    with np.errstate(over="ignore"):
+        mixed = places.astype(np.uint64) * odd
+        return mixed[:, 0] + (mixed[:, 1] ^ mixed[:, 1] >> np.uint64(29)) + (mixed[:, 2] ^ mixed[:, 2] >> np.uint64(31))
+
+
+def cost(tree: Tree, index: int) -> int:
+    """Bytes of memory that a node takes while it is read: as it lies in the file, its records, and what is made of them."""
+    return int(tree.nodes["size"][index]) + int(tree.nodes["count"][index]) * (2 * tree.kind.itemsize + A_POINT)
 
 
 def fetch(tree: Tree, index: int, source: Source) -> bytes:

@@ -16,14 +16,20 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import copc
+import laz
 import numpy as np
 from address import last_of
-from source import MOST_BYTES, Source, SourceError
+from source import Pace, Source, SourceError, budget
 
 ENDINGS = {"laszip": "laz", "binary": "bin"}
-MOST_TEXT = 1 << 28  # bytes of a file of JSON
+MOST_TEXT = 1 << 25  # bytes of a file of JSON: a million nodes
+MOST_HEAD = 1 << 22  # bytes of ept.json
+IN_MEMORY = 16  # times its bytes that JSON takes in Python
+A_FILE = 65536  # bytes of a node's file beside its points
 FETCHERS = 8  # of the hierarchy's files, at once
 A_POINT = 10  # bytes, about, before a node was seen
+A_RECORD = 67  # bytes of the widest point format of LAS: LAZ may hold more than the schema tells
+MOST_HIERARCHY = 1 << 28  # bytes of all its files
 
 _KEY = re.compile(r"(\d{1,2})-(\d{1,9})-(\d{1,9})-(\d{1,9})")
 _NUMBERS = {("signed", 1): "i1", ("signed", 2): "<i2", ("signed", 4): "<i4", ("signed", 8): "<i8", ("unsigned", 1): "u1", ("unsigned", 2): "<u2",
@@ -53,6 +59,7 @@ class Tree:
     parents: np.ndarray
     cubes: np.ndarray
     gaps: np.ndarray
+    record_size: int = 0  # bytes of a point at most
     color: str = ""
     names: set[str] = field(default_factory=set)  # of what its points have
 
@@ -69,7 +76,7 @@ class Records:
 def read_tree(source: Source) -> Tree:
     """SourceError with a sentence where there is none."""
     name = last_of(source.name)
-    head = _json(name, source.file(name, MOST_TEXT))
+    head = _json(name, source.file(name, MOST_HEAD))
     try:
         bounds, tight = (np.array(box, float) for box in (head["bounds"], head.get("boundsConforming", head["bounds"])))
         packed, zipped, span = head["dataType"], {"json": False, "gzip": True}[head.get("hierarchyType", "json")], float(head.get("span", head.get("ticks")))
@@ -95,7 +102,7 @@ def read_tree(source: Source) -> Tree:
     origin = copc.origin_of(lower, upper, float(scale.min()))
     grown = np.tile(np.array([-1, 1])[:, None] * scale, 1).reshape(1, 6)  # points are rounded to the scale
     return Tree(packed, record if packed == "binary" else None, scale, offset, lower, upper, origin, wkt if isinstance(wkt, str) else "", nodes,
-                parents, cubes - np.tile(origin, 2) + grown, gaps)
+                parents, cubes - np.tile(origin, 2) + grown, gaps, max(record.itemsize, A_RECORD))
 
 
 def _json(name: str, data: bytes) -> dict:
@@ -110,12 +117,15 @@ def _json(name: str, data: bytes) -> dict:
 
 def _hierarchy(source: Source, zipped: bool) -> np.ndarray:
     """Entries of all nodes with points, by their key."""
-    waiting, seen, found = ["0-0-0-0"], {"0-0-0-0"}, []
+    waiting, seen, found, total = ["0-0-0-0"], {"0-0-0-0"}, [], 0
+    pace = Pace(copc.MOST_PAGES, MOST_HIERARCHY)
     pool = ThreadPoolExecutor(FETCHERS)
     try:
         while waiting:
             below = []
-            for name, counts in pool.map(lambda key: _counts(source, key, zipped), waiting):
+            for name, counts, size in pool.map(lambda key: _counts(source, key, zipped), waiting):
+                pace.add(size)
+                own: list[tuple[int, ...]] = []
                 for key, count in counts.items():
                     match = _KEY.fullmatch(key)
                     if not match or type(count) is not int or not -1 <= count <= copc.MOST_POINTS:
@@ -126,21 +136,26 @@ def _hierarchy(source: Source, zipped: bool) -> np.ndarray:
                         seen.add(key)
                         below.append(key)
                     elif count:
-                        found.append((*map(int, match.groups()), count))
-                if len(found) > copc.MOST_NODES:
-                    raise SourceError("its octree is damaged: it has too many nodes")
+                        own.append((*map(int, match.groups()), count))
+                found.append(np.array(own, np.int64).reshape(-1, 5))
+                total += len(own)
+                if total > copc.MOST_NODES:
+                    raise SourceError(f"its octree is damaged: it has more than {copc.MOST_NODES:,} nodes")
+                if len(seen) > copc.MOST_PAGES:
+                    raise SourceError(f"its octree is damaged: its hierarchy has more than {copc.MOST_PAGES:,} pages")
             waiting = below
     finally:
         pool.shutdown(cancel_futures=True)
-    if not found:
+    if not total:
         raise SourceError("its octree is damaged: no node has points")
-    nodes, numbers = np.zeros(len(found), copc.ENTRY), np.array(found, np.int64)
+    nodes, numbers = np.zeros(total, copc.ENTRY), np.concatenate(found)
     nodes["key"], nodes["count"] = numbers[:, :4], numbers[:, 4]
     nodes["size"] = np.minimum(A_POINT * numbers[:, 4], 0x7fffffff)
     return copc.in_order(nodes)
 
 
-def _counts(source: Source, key: str, zipped: bool) -> tuple[str, dict]:
+def _counts(source: Source, key: str, zipped: bool) -> tuple[str, dict, int]:
+    """A file of the hierarchy: its name, what it says, and its bytes."""
     name = f"ept-hierarchy/{key}.json" + ".gz" * zipped
     data = source.file(name, MOST_TEXT)
     if zipped:
@@ -151,12 +166,25 @@ def _counts(source: Source, key: str, zipped: bool) -> tuple[str, dict]:
             raise SourceError(f"{name} cannot be unpacked: {error}") from None
         if not unzip.eof:
             raise SourceError(f"{name} cannot be unpacked: it is cut, or too large")
-    return name, _json(name, data)
+    if data.count(b"{") > 1 or b"[" in data:  # Python takes twenty times as much memory for lists in lists
+        raise SourceError(f"its octree is damaged: {name} holds lists or objects among its numbers")
+    with budget.of(IN_MEMORY * len(data)):
+        return name, _json(name, data), len(data)
 
 
 def fetch(tree: Tree, index: int, source: Source) -> bytes:
     """A node's file."""
-    return source.file(key_of(tree, index), MOST_BYTES)
+    return source.file(key_of(tree, index), _most(tree, index))
+
+
+def _most(tree: Tree, index: int) -> int:
+    """Bytes that a node's file takes at most."""
+    return copc.PACKED * tree.record_size * int(tree.nodes["count"][index]) + A_FILE
+
+
+def cost(tree: Tree, index: int) -> int:
+    """As copc.cost."""
+    return _most(tree, index) + int(tree.nodes["count"][index]) * (2 * tree.record_size + copc.A_POINT)
 
 
 def key_of(tree: Tree, index: int) -> str:
@@ -185,6 +213,7 @@ def unpack(tree: Tree, index: int, data: bytes) -> Records:
 def _laz(name: str, data: bytes, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     import laspy
     import lazrs
+    _check(name, data, count)
     try:
         with laspy.open(io.BytesIO(data), laz_backend=laspy.LazBackend.Lazrs) as file:
             header = file.header
@@ -203,6 +232,36 @@ def _laz(name: str, data: bytes, count: int) -> tuple[np.ndarray, np.ndarray, np
         if type(error).__name__ != "PanicException":
             raise
         raise SourceError(f"{name} cannot be unpacked: {error}") from None
+
+
+def _check(name: str, data: bytes, count: int) -> None:
+    """Compares the sizes that a LAZ announces with its own, before lazrs allocates them."""
+    if len(data) < 227 or data[:4] != b"LASF":
+        raise SourceError(f"{name} is no LAS file")
+    at, offset, records, form, record = struct.unpack_from("<HIIBH", data, 94)
+    vlr = b""
+    for _ in range(min(records, 4096)):
+        if at + 54 > min(offset, len(data)):
+            break
+        number, length = struct.unpack_from("<HH", data, at + 18)
+        if data[at + 2:at + 18].rstrip(b"\0") == b"laszip encoded" and number == 22204:
+            vlr = data[at + 54:at + 54 + length]
+        at += 54 + length
+    if not form & 0xC0:
+        return
+    try:
+        layers, place = laz.layers_of(vlr, record), offset + 8
+        for held, size in laz.chunks_of(io.BytesIO(data), len(data), offset, vlr, record, count):
+            if layers:
+                laz.check_chunk(data[place:place + record + 4 * (1 + layers)], size, None, record, layers)
+            place += size
+    except (laz.LazError, struct.error, lazrs_error()) as error:
+        raise SourceError(f"{name} cannot be unpacked: {error}") from None
+
+
+def lazrs_error() -> type[Exception]:
+    import lazrs
+    return lazrs.LazrsError
 
 
 def learn(tree: Tree, data: bytes, records: Records) -> None:

@@ -10,35 +10,40 @@ nothing can be fetched any more, error with one that ends it. It ends with its i
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
 import threading
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parents[1] / "unpacking")]
 import copc  # noqa: E402
 import ept  # noqa: E402
 from address import is_ept  # noqa: E402
 from kept import kept  # noqa: E402
-from source import Resting, SourceError, source_of  # noqa: E402
+from limits import limit_memory  # noqa: E402
+from source import MEMORY, Resting, SourceError, budget, source_of  # noqa: E402
 
 MOST_FAILURES = 3  # pages in a row that cannot be fetched: then nothing else is tried until somebody asks again
 MOST_WAITING = 64  # pages that lie there until Blender takes them
+WAITING_BYTES = 1 << 29  # of these pages
 
 
 class Reader:
     def __init__(self, folder: Path, wanted: dict) -> None:
         self._folder, self._scalar, self._notes = folder, wanted.get("scalar", ""), 0
         place, keep = wanted["place"], wanted.get("keep")
-        self._source = source_of(place, wanted.get("timeout", 20.0), wanted.get("wait", 0.5), wanted.get("offline", ""))
+        self._source = source_of(place, wanted.get("timeout", 10.0), wanted.get("wait", 0.5), wanted.get("offline", ""))
         if keep:
             self._source = kept(self._source, keep["folder"], keep["bytes"], self._note)
         self._kind = ept if is_ept(place) else copc
         try:
             self._tree = self._kind.read_tree(self._source)
-            first = self._kind.fetch(self._tree, 0, self._source)
-            self._kind.learn(self._tree, first, self._kind.unpack(self._tree, 0, first))
+            with budget.of(self._kind.cost(self._tree, 0)):
+                first = self._kind.fetch(self._tree, 0, self._source)
+                self._kind.learn(self._tree, first, self._kind.unpack(self._tree, 0, first))
+            del first
         except Exception as error:
             if not isinstance(error, (ImportError, MemoryError)):
                 self._source.forget()
@@ -80,11 +85,21 @@ class Reader:
     def _next(self) -> int:
         with self._change:
             while True:
-                if self._queue and sum(name.endswith(".page") for name in os.listdir(self._folder)) < MOST_WAITING:
+                if self._queue and self._has_room():
                     page = self._queue.pop(0)
                     self._done.add(page)
                     return page
                 self._change.wait(0.01 if self._queue else None)
+
+    def _has_room(self) -> bool:
+        """Whether Blender has taken enough of what lies there."""
+        count = size = 0
+        with os.scandir(self._folder) as found:
+            for entry in found:
+                if entry.name.endswith(".page"):
+                    with contextlib.suppress(FileNotFoundError):
+                        count, size = count + 1, size + entry.stat().st_size
+        return count < MOST_WAITING and size < WAITING_BYTES
 
     def _work(self) -> None:
         while True:
@@ -96,9 +111,12 @@ class Reader:
 
     def _give(self, page: int) -> None:
         try:
-            self._unpack(page)
+            with budget.of(self._kind.cost(self._tree, page)):
+                self._unpack(page)
         except OSError:
             raise
+        except SourceError as error:  # it needs more memory than there is
+            self._lose(page, f"page {page}: {error}")
         except Exception as error:  # of a reader: who waits for the page is told
             self._lose(page, f"page {page}: {type(error).__name__}: {error}")
 
@@ -143,6 +161,7 @@ class Reader:
 
 def main() -> None:
     folder = Path(sys.argv[1])
+    limit_memory(3 * MEMORY)
     try:
         reader = Reader(folder, json.loads(sys.stdin.readline()))
     except Exception as error:

@@ -4,6 +4,7 @@ library, and runs in a process of its own."""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import http.client
 import os
@@ -12,24 +13,69 @@ import threading
 import time
 import urllib.error
 import urllib.parse
-import urllib.request
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+import web
 from address import is_address, is_ept, last_of
+from web import Slow, SourceError, Unreachable
 
-TIMEOUT = 20.0  # seconds without a byte
-TRIES = 3
+TIMEOUT = 10.0  # seconds without a byte, or for web.PACE bytes
+TRIES, SLOW_TRIES = 3, 2  # of any request, and of one that gets no answer in time
 WAIT = 0.5  # seconds before the second one, twice as long before each further one
 HEAD = 589  # bytes of a file that are looked at first: the head of a COPC, and its record
-MOST_BYTES = 1 << 30  # of a file that is read whole
+MOST_WAIT = 30.0  # seconds that a server may ask to wait before the next try
+MOST_BYTES = 1 << 26  # of a file that is read whole, if nobody says less
+MEMORY = 1 << 30  # bytes that all workers together may take for nodes
 
 
-class SourceError(Exception):
-    """The text is for the artist; who catches it says where."""
+class Budget:
+    """Memory that several threads share. One that wants more waits for the others."""
+
+    def __init__(self, total: int) -> None:
+        self._total = self._left = total
+        self._change = threading.Condition()
+
+    @contextlib.contextmanager
+    def of(self, size: int) -> Iterator[None]:
+        """SourceError where it is more than all there is."""
+        if size > self._total:
+            raise SourceError(f"needs {size / 1e6:,.0f} MB of memory; at most {self._total / 1e6:,.0f} are taken for it")
+        with self._change:
+            self._change.wait_for(lambda: self._left >= size)
+            self._left -= size
+        try:
+            yield
+        finally:
+            with self._change:
+                self._left += size
+                self._change.notify_all()
 
 
-class Unreachable(SourceError):
-    """Nobody answers: the file may be as it was."""
+budget = Budget(MEMORY)
+
+
+class Pace:
+    """How long a tree may take to be read: by its pages and bytes. SourceError where it takes longer, or is larger than a tree."""
+
+    def __init__(self, most_pages: int, most_bytes: int) -> None:
+        self._began, self._pages, self._bytes = time.monotonic(), 0, 0
+        self._most_pages, self._most_bytes = most_pages, most_bytes
+
+    def add(self, size: int) -> None:
+        """A page that was read."""
+        self._pages += 1
+        self._bytes += size
+        seconds = time.monotonic() - self._began
+        if self._pages > self._most_pages:
+            raise SourceError(f"its octree is damaged: its hierarchy has more than {self._most_pages:,} pages")
+        if self._bytes > self._most_bytes:
+            raise SourceError(f"its octree is damaged: its hierarchy is larger than {self._most_bytes:,} bytes")
+        if seconds > TREE_SECONDS + PAGE_SECONDS * self._pages + self._bytes / TREE_RATE:
+            raise SourceError(f"reading its hierarchy was stopped, because it is too slow: {self._pages:,} pages in {seconds:.0f} seconds")
+
+
+TREE_SECONDS, PAGE_SECONDS, TREE_RATE = 60.0, 0.5, 10_000.0  # of any tree, of each page, and bytes a second
 
 
 class Resting(SourceError):
@@ -86,6 +132,8 @@ class FileSource(Source):
             raise SourceError(f"cannot be read: {error.strerror}") from None
 
     def read(self, offset: int, size: int) -> bytes:
+        if size < 0 or offset < 0 or offset + size > os.fstat(self._file.fileno()).st_size:
+            raise SourceError(f"cannot be read: ends before byte {offset + size:,}")
         try:
             with self._lock:
                 self._file.seek(offset)
@@ -134,15 +182,25 @@ class _Web(Source):
     def _get(self, address: str, part: tuple[int, int] | None, most: int, known: State | None = None) -> tuple[State, bytes | None]:
         """A part of what lies there, (first, last), or all; None in its place: it is as it is known."""
         for attempt in range(TRIES):
+            wait = self._wait * 2 ** attempt
             try:
                 return self._fetch(address, part, most, known)
-            except _Final as error:
+            except web.Refused as error:
                 raise SourceError(str(error)) from None
+            except Slow as error:  # each try takes as long
+                if attempt + 1 >= SLOW_TRIES:
+                    raise
+                why, kind = str(error), Unreachable
+            except web.Busy as error:
+                why, kind = str(error), Unreachable
+                if (error.wait or 0.0) > MOST_WAIT:
+                    raise Unreachable(why) from None
+                wait = max(wait, error.wait or 0.0)
             except (SourceError, OSError, http.client.HTTPException, ValueError) as error:
                 why = _sentence(error)
                 kind = Unreachable if isinstance(error, (Unreachable, OSError, http.client.HTTPException)) else SourceError
             if attempt + 1 < TRIES:
-                time.sleep(self._wait * 2 ** attempt)
+                time.sleep(wait)
         raise kind(f"{why}, {TRIES} times")
 
     def _fetch(self, address: str, part: tuple[int, int] | None, most: int, known: State | None) -> tuple[State, bytes | None]:
@@ -154,28 +212,21 @@ class _Web(Source):
         if known and known.modified:
             headers["If-Modified-Since"] = known.modified
         try:
-            answer = urllib.request.urlopen(urllib.request.Request(address, headers=headers),  # noqa: S310  http and https alone: source_of
-                                            timeout=self._timeout)
-        except urllib.error.HTTPError as error:
-            code = error.code
-            error.close()
-            if code == 304 and known:
+            answer = web.fetch(address, headers, most, self._timeout)
+        except urllib.error.HTTPError as error:  # 304
+            if known:
                 return known, None
-            if code in {408, 425, 429} or code >= 500:
-                raise Unreachable(f"the server answers {code}") from None
-            raise _Final(f"the server answers {code} {error.reason}") from None
-        with answer:
-            total = None
-            if part:
-                if answer.status != 206:
-                    raise _Final(f"the server sends no parts of files (it answers {answer.status} to a range)")
-                total = _total(answer.headers.get("Content-Range", ""), *part)
-            data = answer.read(most + 1)
-            told = answer.headers.get("Content-Length", "")
-            state = State(total, answer.headers.get("ETag", ""), answer.headers.get("Last-Modified", ""))
-        size = part[1] - part[0] + 1 if part else int(told) if told.isdigit() else len(data)
+            raise web.Refused(f"the server answers {error.code}, which was not asked for") from None
+        total = None
+        if part:
+            if answer.status != 206:
+                raise web.Refused(f"the server sends no parts of files (it answers {answer.status} to a range)")
+            total = _total(answer.headers.get("Content-Range", ""), *part)
+        data, told = answer.data, answer.headers.get("Content-Length", "")
+        state = State(total, answer.headers.get("ETag", ""), answer.headers.get("Last-Modified", ""))
+        size = part[1] - part[0] + 1 if part else int(told) if told.isascii() and told.isdigit() and len(told) < 19 else len(data)
         if not part and size > most:
-            raise _Final(f"what the server sends is larger than {most:,} bytes")
+            raise web.Refused(f"what the server sends is larger than {most:,} bytes")
         if len(data) != size:
             raise SourceError(f"the server cut the connection after {len(data):,} of {size:,} bytes" if len(data) < size else
                               f"the server sent more than the {size:,} bytes that were asked for")
@@ -233,15 +284,11 @@ class Nowhere(Source):
         raise Unreachable(self._why)
 
 
-class _Final(Exception):
-    """Another try would not help."""
-
-
 def _total(told: str, first: int, last: int) -> int | None:
     """Of the file that a part is of, by its Content-Range."""
-    found = re.fullmatch(r"bytes (\d+)-(\d+)/(\d+|\*)", told.strip())
+    found = re.fullmatch(r"bytes ([0-9]{1,18})-([0-9]{1,18})/([0-9]{1,18}|\*)", told[:100].strip())
     if not found or (int(found[1]), int(found[2])) != (first, last):
-        raise SourceError(f"the server sent another part than was asked for ('{told[:60]}')")
+        raise SourceError(f"the server sent another part than was asked for ('{web._plain(told)}')")
     return None if found[3] == "*" else int(found[3])
 
 
