@@ -131,7 +131,7 @@ def picture(world: World, scan: Scan, scene: Scene, seen: Camera, tree: cKDTree 
                     return (scan.surface[sample] == surface[at]) & (thin[at] | facing)
 
                 eyes = np.asarray(scene.survey.stations)
-                found = _by_grid(scan, eyes, scene.survey.step, place, fits) if hasattr(scene.survey, "step") and len(eyes) \
+                found = _by_grid(scan, eyes, scene.survey.step, place, fits) if len(scan.stations) and hasattr(scene.survey, "step") \
                     else _by_tree(scan, tree or cKDTree(scan.true_position), place, fits)
                 flat = [np.zeros(len(t), bool), np.zeros(len(t), bool), np.zeros((len(t), 3), np.uint8)]
                 flat[0][hit], flat[1][hit] = thin, found >= 0

@@ -16,8 +16,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from truth.scans import exact, metrics, scanner  # noqa: E402
 from truth.scans import scenes as frozen  # noqa: E402
+from truth.scans.campaign import Campaign, Instrument, Station  # noqa: E402
 from truth.scans.scenes import Scene, Survey, View  # noqa: E402
-from truth.scans.solids import Solids, World  # noqa: E402
+from truth.scans.solids import GLASS, Solids, World  # noqa: E402
 
 # Scenes, scanners, cameras and thresholds are frozen: whoever changes one changes every figure that was ever told.
 FROZEN = "10103c5f5fceea75"
@@ -188,6 +189,24 @@ class Seen(unittest.TestCase):
         self.assertFalse(shown.scanned[dark].any())
         self.assertFalse(shown.scanned[floor_ & (reach > 4.2)].any())
         self.assertLess(np.abs(shown.ceiling[shown.scanned].astype(int) - 128).max(), 10)
+
+    def test_what_was_photographed_and_what_a_campaign_scanned(self) -> None:
+        """Samples without a grid that the picture may use: the board and the floor around it were seen; behind a pane, which is
+        nearest, the picture shows what is behind."""
+        photos = Survey("photos", ((0.0, -3.0, 3.0), (2.0, -3.0, 3.0)), noise=0.0005, drop=0.1, count=60_000)
+        station = Campaign((Station((0.0, 0.0, 3.0), Instrument(0.5, strays=0.0, registration=0.0, lowest=-80.0, highest=0.0)),))
+        solids = self.SCENE.make()
+        solids.part(gloss=GLASS)
+        solids.quads([(-9, -4.0, -1)], [(9, -4.0, -1)], [(9, -4.0, 9)], [(-9, -4.0, 9)], 0)
+        for survey, eye, world in ((photos, -3.0, self.SCENE.make().world()), (station, -3.0, self.SCENE.make().world()),
+                                   (station, -6.0, solids.world())):
+            scene = replace(self.SCENE, survey=survey, views=(View((0.0, eye, 6.0), (0.0, 0.0, 0.0)),))
+            seen = exact.camera(scene.views[0], width=60, height=40)
+            shown = exact.picture(world, scanner.scan(world, survey), scene, seen, width=60, height=40)
+            board = shown.surface == 1
+            self.assertGreater(board.sum(), 20)
+            self.assertGreater(shown.scanned[board].mean(), 0.8)
+            self.assertEqual(bool((shown.near[board] < shown.middle[board] - 1.0).all()), eye < -4.0)
 
     def test_metrics_of_pictures_by_hand(self) -> None:
         shape = 100, 200

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far trust carries: tables per scene and per cause, and the reliability curve.
 
-    build/out/venv/bin/python tests/truth/trust/report.py FOLDER [--scenes unseen] [--trees 160]
+    build/out/venv/bin/python tests/truth/trust/report.py FOLDER [--scenes unseen] [--trees 100]
 
 Trains on the scenes for training and judges others, held out ones by default. FOLDER: as train.py's. As a module: tables() of given
 scores."""

@@ -14,7 +14,7 @@ from ..scans.scanner import CAUSES
 from . import features as plain
 
 RIGHT, WRONG = 40_000, 20_000  # samples a scene, at most
-GROUPS = 3  # of scenes that are trained on in turns
+GROUPS = 5  # of scenes that are trained on in turns
 KINDS = ("mixed", "noise", "mirrored", "stray", "rain", "passer")
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Trains the trees that tell wrong samples from right ones, and writes them as C.
 
-    build/out/venv/bin/python tests/truth/trust/train.py FOLDER [--trees 160] [--scenes trained] [--out FILE.h] [--report FILE.md]
+    build/out/venv/bin/python tests/truth/trust/train.py FOLDER [--trees 100] [--scenes trained] [--out FILE.h] [--report FILE.md]
     build/out/venv/bin/python tests/truth/trust/train.py [FOLDER] --check
 
 FOLDER has NAME.f32 of each scene and NAME.known.f32 of those whose stations are known, as measure.py writes them: the library's
@@ -33,7 +33,7 @@ from truth.trust import boost, features, report, samples  # noqa: E402
 
 CONSTANTS = ROOT / "native/scene/trust_constants.h"
 FEATURES = ROOT / "native/scene/trust_features.h"
-TREES = 160
+TREES = 100
 SURE_AFTER = 10  # trees, after which most points need no more
 SURE_LOST = 0.002  # of the wrong samples may count as sure then
 LOST = 0.01  # of the right samples of each scene: at most so many fall below the default threshold
