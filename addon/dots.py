@@ -33,5 +33,5 @@ def _leaves_out(style: CloudStyle, cut: bool) -> bool:
 
 
 def _whole(style: CloudStyle) -> CloudStyle:
-    return replace(style, hidden_classes=(0,) * 8, hidden_kinds=0, least_trust=0.0, free_space=0, clip_off=0, cull_back=0,
+    return replace(style, hidden_classes=(0,) * 8, hidden_kinds=0, least_trust=-1.0, free_space=0, clip_off=0, cull_back=0,
                    transparency=0.0, surface=0)

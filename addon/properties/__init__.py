@@ -285,8 +285,9 @@ class PatinaObjectProperties(PropertyGroup):
         name="Unclassified", override=_OVERRIDE, default=False,
         description="Points of the classes 0, never classified, and 1, unassigned, are not drawn and cast no shadow")
     least_trust: FloatProperty(
-        name="Trust", override=_OVERRIDE, default=0.0, min=0.0, max=1.0, subtype='FACTOR',
-        description="Points whose neighbors leave more doubt about what they are part of are not drawn and cast no shadow")
+        name="Trust", override=_OVERRIDE, default=0.78, min=0.0, max=1.0, subtype='FACTOR',
+        description="Points of less trust are not drawn and cast no shadow. Trust is the probability that a point lies on a surface, "
+                    "and is no mixed pixel or stray. 0: all points are drawn")
     opacity: FloatProperty(
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
         description="How much the surface hides of what lies behind it")
@@ -357,8 +358,7 @@ class PatinaViewLayerProperties(PropertyGroup):
         description="Share of each pixel that a line covers, of the nearest layer; without lines 0")
     use_pass_trust: BoolProperty(
         name="Trust", default=False, update=_update_passes, override=_OVERRIDE,
-        description="How well what each point is taken for explains its neighbors, 0 to 1, of the nearest point; "
-                    "0 where nothing is, or the points were not analyzed")
+        description="Probability that the nearest point lies on a surface, 0 to 1; 0 where nothing is, or the points were not analyzed")
     use_pass_thickness: BoolProperty(
         name="Thickness", default=False, update=_update_passes, override=_OVERRIDE,
         description="Sigma of the nearest point's surface, in the scene's units: noise, and how far scans disagree; "

@@ -635,6 +635,13 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, bool(analyzed), stations, by, scans, scan_of)
 
 
+def least_trust(patina: bpy.types.PropertyGroup) -> float:
+    """As the library takes it: 0 is its default, and what is below 0 draws all points."""
+    if patina.least_trust <= 0.0:
+        return -1.0
+    return 0.0 if abs(patina.least_trust - native.TRUST_DEFAULT) < 1e-6 else patina.least_trust
+
+
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
     patina = obj.patina
     return CloudStyle(
@@ -653,7 +660,7 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         largest_gap=patina.largest_gap,
         free_space=enum_number(patina, "free_space"),
         hidden_kinds=int(patina.hide_stray) << native.KINDS.index("STRAY"),
-        least_trust=patina.least_trust,
+        least_trust=least_trust(patina),
         **ranges.style_fields(obj), **colors.style_fields(obj))
 
 

@@ -32,8 +32,8 @@ def spare_analysis(obj: bpy.types.Object, surface: str, layer: bpy.types.ViewLay
     """Whether an object is drawn as range images, and nothing else asks for what an analysis finds: it may have one, and its picture is
     the same. surface: of the scene."""
     patina = obj.patina
-    asked = (patina.analysis == 'ALWAYS' or patina.soft.use or patina.cull_back or patina.hide_stray or patina.least_trust > 0.0
-             or patina.free_space != 'OFF')
+    asked = (patina.analysis == 'ALWAYS' or patina.soft.use or patina.cull_back or patina.hide_stray
+             or patina.least_trust > 0.0 and abs(patina.least_trust - native.TRUST_DEFAULT) > 1e-6 or patina.free_space != 'OFF')
     return ((patina.ranges.use or surface == 'RANGES') and not asked
             and not (layer.patina.use_pass_trust or layer.patina.use_pass_thickness))
 

@@ -70,6 +70,7 @@ class PATINA_PT_statistics(SidebarPanel, Panel):
         shown = found.shown
         stats, level = shown.stats, shown.wish.level
         figures = [("Points", f"{stats['points']:,}"), ("In View", f"{stats['points_scattered']:,}"),
+                   ("Left Out for Trust", f"{stats['untrusted']:,}"),
                    ("Triangles", f"{stats['triangles']:,}"),
                    ("Chunks", f"{stats['chunks'] - stats['chunks_culled']:,} of {stats['chunks']:,}"),
                    ("Spacing", f"{stats['spacing_px']:.2f} pixels"),

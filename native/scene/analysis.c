@@ -487,6 +487,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
         pt_neighbours_destroy(&walk->tree);
         return error;
     }
+    walk->tree.any_twins = walk->coarse.any_twins = 1; // a million points at one place take no longer than others
     walk->rows = !walk->beams.count && lies_in_rows(walk); // a station's cells tell better
     pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
     error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : judge(walk, pool);

@@ -30,6 +30,7 @@ struct pt_neighbours {
     struct pt_chunk_node *chunk_nodes; // 2 chunks - 1, in preorder
     uint32_t *chunk_order;             // of the leaves of that tree
     double origin[3];                  // of the cloud's frame
+    int any_twins;                     // 1: of more points at one place than are wanted any are found, not the first by number
     int level;                         // of instructions: 0 plain, 1 AVX2, 2 AVX-512. Never changes a result
 };
 

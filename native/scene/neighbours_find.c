@@ -86,6 +86,12 @@ static void begin_lane(struct walk *walk, uint32_t lane)
     walk->worst[lane] = DBL_MAX;
 }
 
+// A full list's farthest: -1 ends the search of a point that has found enough at its own place.
+static inline double worst_of(const struct walk *walk, double square)
+{
+    return square > 0.0 || !walk->tree->any_twins ? square : -1.0;
+}
+
 // Those of a leaf's points that `near` marks, which were near enough when it was made; the leaf's first place.
 static inline void take_each(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first)
 {
@@ -108,7 +114,7 @@ static inline void take_each(struct walk *walk, uint32_t lane, const double squa
         places[at] = place;
     }
     walk->found->count[lane] = count;
-    walk->worst[lane] = count == walk->k ? squares[count - 1] : DBL_MAX;
+    walk->worst[lane] = count == walk->k ? worst_of(walk, squares[count - 1]) : DBL_MAX;
 }
 
 // ---- plain -----------------------------------------------------------------------------------------------------------------
@@ -264,7 +270,7 @@ TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk
                 _mm256_storeu_si256((__m256i *)(places + 8 * i), p[i]);
             }
             walk->found->count[lane] = count;
-            walk->worst[lane] = count == walk->k ? squares[last] : DBL_MAX;
+            walk->worst[lane] = count == walk->k ? worst_of(walk, squares[last]) : DBL_MAX;
             take_each(walk, lane, square, near, first);
             return;
         }
@@ -285,7 +291,7 @@ TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk
         _mm256_storeu_si256((__m256i *)(places + 8 * i), p[i]);
     }
     walk->found->count[lane] = count;
-    walk->worst[lane] = count > last ? squares[last] : DBL_MAX;
+    walk->worst[lane] = count > last ? worst_of(walk, squares[last]) : DBL_MAX;
 }
 
 TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near,

@@ -464,15 +464,17 @@ def test_hidden_points():
         alpha = render()["Combined"][..., 3] > 0
         return sum(alpha[row - 2:row + 3, column - 2:column + 3].any() for row, column in places), alpha
 
+    obj.patina.least_trust = 0.0
     count, everything = shown()
     check(count == 3 and only_cloud().kinds[5] >= 3, f"{count} of 3 strays, kinds {only_cloud().kinds}")
-    obj.patina.hide_stray = True
+    obj.patina.property_unset("least_trust")
     count, alpha = shown()
     check(count == 0 and alpha.sum() > 0.9 * everything.sum() and not said("Analyzing"), f"{count} strays, {alpha.sum()} pixels")
-    obj.patina.hide_stray = False
-    obj.patina.least_trust = 1.0
-    check(shown()[1].sum() < 0.7 * everything.sum() and not said("Analyzing"), "doubtful ones")
     obj.patina.least_trust = 0.0
+    obj.patina.hide_stray = True
+    count, alpha = shown()
+    check(count == 0 and alpha.sum() > 0.9 * everything.sum(), f"hidden kind: {count} strays, {alpha.sum()} pixels")
+    obj.patina.hide_stray = False
     obj.patina.hide_unclassified = True
     count, alpha = shown()
     check(count == 2 and not alpha[50:70, 80 + 40:80 + 50].any() and alpha[:, 30:80].any(), "unclassified")

@@ -87,17 +87,18 @@ def test_headlight_follows_the_view():
 
 
 def test_what_is_hidden_follows():
-    """Gaps, doubts and strays change the picture at once, and nothing is built or analyzed again: Blender tags geometry with each
+    """Gaps and trust change the picture at once, and nothing is built or analyzed again: Blender tags geometry with each
     property, so the points are read, and found to be the same."""
     scene = setup()
     scene.patina.surface = 'SPLATS'
     obj = add_points(np.concatenate([sphere(3000, 1.5, (0, 0, 0))[0], [[2.2, 1.0, 0.0]]]))
+    obj.patina.least_trust = 0.0
     obj.patina.lighting = 'UNLIT'
     yield lambda: settled(3001) and shown().shown.clouds[0].cloud.has_shapes
     found = shown()
     covered = [float((found.shown.color[..., 3] > 0).mean())]
     built = found.shown.clouds[0].cloud
-    for name, value in (("largest_gap", 0.02), ("hide_stray", True), ("least_trust", 1.0)):
+    for name, value in (("largest_gap", 0.02), ("least_trust", 0.78)):
         before = found.pictures
         setattr(obj.patina, name, value)
         yield lambda: newer(before)() and settled(3001)

@@ -377,7 +377,7 @@ static void test_words(void **state)
             axis[k] /= sqrt(length);
         struct pt_neighbourhood in = {.kind = 1u + (uint32_t)i % 5u,
                                       .major = exp(pcg_between(&random, 0.0, 9.0)),
-                                      .trust = 0.4},
+                                      .trust = 0.36},
                                 out;
         in.minor = in.major / exp(pcg_between(&random, 0.0, 2.4));
         in.sigma = 0.3;
@@ -385,7 +385,7 @@ static void test_words(void **state)
         pt_unpack_shape(pt_pack_shape(&in, bits, 1.0), bits, 1.0, &out);
         assert_int_equal(out.kind, in.kind);
         assert_true(fabs(log2(out.major / in.major)) <= 0.126 && fabs(log2(out.minor / in.minor)) <= 0.26);
-        assert_true(fabs(log2(out.sigma / in.sigma)) <= 0.126 && fabs(out.trust - 0.4) < 1e-9);
+        assert_true(fabs(log2(out.sigma / in.sigma)) <= 0.126 && fabs(out.trust - 0.36) < 1e-9);
         const double turned = fabs(out.axis[0] * axis[0] + out.axis[1] * axis[1] + out.axis[2] * axis[2]);
         assert_true(turned > cos(3.14159265 / 128.0 + 1e-6));
     }

@@ -216,9 +216,9 @@ static struct looked look(patina_device *device, const patina_cloud *cloud, cons
 }
 
 static uint8_t kinds[MOST];
-static float certainties[MOST];
+static float trusts[MOST];
 static int is_no_surface(uint32_t id) { return kinds[id] != PATINA_KIND_SURFACE; }
-static int is_certain(uint32_t id) { return certainties[id] >= 0.95f; }
+static int is_trusted(uint32_t id) { return trusts[id] >= 0.95f; }
 
 static void test_pictures(void **state)
 {
@@ -235,13 +235,14 @@ static void test_pictures(void **state)
         CHECK(patina_cloud_create(&cloud_desc, NULL, &cloud), NULL);
         const patina_analysis_desc desc = describe(&scan, stations, 0);
         CHECK(patina_cloud_analyse(cloud, &desc, NULL), cloud);
-        const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .kind = kinds, .trust = certainties};
+        const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .kind = kinds, .trust = trusts};
         CHECK(patina_cloud_neighbourhoods(cloud, &wanted, NULL), cloud);
         for (uint32_t k = 0; k < support_device_count(); k++) {
             patina_device *device = support_device_open(support_device_name(k), 0, 0);
             if (!device)
                 continue;
-            patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT};
+            patina_cloud_style style = {
+                .struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .least_trust = -1.0f};
             const struct looked off = look(device, cloud, &style, NULL, marked);
             style.free_space = PATINA_FREE_SPACE_SHOW;
             const struct looked shown = look(device, cloud, &style, NULL, marked);
@@ -257,8 +258,8 @@ static void test_pictures(void **state)
             assert_true(bare.wrong == 0 && bare.others > 0 && bare.others < off.others / 2);
             style.hidden_kinds = 0;
             style.least_trust = 0.95f;
-            const struct looked certain = look(device, cloud, &style, is_certain, marked);
-            assert_true(certain.wrong == 0 && certain.others > 0 && certain.others < off.others);
+            const struct looked trusted = look(device, cloud, &style, is_trusted, marked);
+            assert_true(trusted.wrong == 0 && trusted.others > 0 && trusted.others < off.others);
             style.hidden_kinds = 63;
             assert_int_equal(look(device, cloud, &style, NULL, marked).others, 0);
             patina_device_destroy(device);
@@ -303,6 +304,8 @@ static void test_refusals(void **state)
     style = (patina_cloud_style){.struct_size = sizeof style, .hidden_kinds = 64};
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_ERROR_ARGUMENT);
     style = (patina_cloud_style){.struct_size = sizeof style, .least_trust = NAN};
+    assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_ERROR_ARGUMENT);
+    style.least_trust = 1.5f;
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_ERROR_ARGUMENT);
     patina_scene_destroy(scene);
     patina_cloud_destroy(cloud);
