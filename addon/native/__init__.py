@@ -45,13 +45,19 @@ from .loader import (
 
 __all__ = ["CANCELLED", "FILE", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
            "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "TOO_MANY_POINTS", "Task", "Texture", "WRAPS",
-           "forget_library", "library", "library_path", "log_lines", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
+           "forget_library", "library", "library_path", "log_lines", "losses", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
 
 
 KINDS = tuple(abi.KIND)  # patina_kind
 TRUST_DEFAULT = 0.78  # PATINA_TRUST_DEFAULT
 WRAPS = tuple(abi.WRAP)  # patina_wrap
 NO_PAGE = 2 ** 32 - 1  # PATINA_NO_PAGE
+_losses = [0]  # pictures that lacked points of files that cannot be read any more
+
+
+def losses() -> int:
+    """Grows whenever a picture lacked such points: clouds that were opened before may be such files."""
+    return _losses[0]
 
 
 def _destroy(destroy: Callable[[c_void_p], None], handle: c_void_p, _keep: Any) -> None:
@@ -198,6 +204,7 @@ class Cloud(_Handle):
     numbers_stamp = 0  # counts how often they changed
     scan_name: str = ""
     scan_numbers: tuple[int, ...] = ()
+    losses: int | None = None  # of a mapped file: losses() as it was opened
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
                  progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None,
@@ -228,6 +235,7 @@ class Cloud(_Handle):
         """A saved cloud, mapped; offset: added to every position, float64. PatinaError when it is not one of this version."""
         cloud = cls.__new__(cls)
         _Handle.__init__(cloud, os.fsencode(path), (c_double * 3)(*offset), create="patina_cloud_open_at")
+        cloud.losses = losses()
         cloud._learn()
         return cloud
 
@@ -633,6 +641,7 @@ class Frame(_Handle):
         stats = abi.FrameStats()
         self._call("get_stats", byref(stats))
         values = {name: getattr(stats, name) for name, _ in abi.FrameStats._fields_[1:]}
+        _losses[0] += values["points_lost"] > 0
         values["expected"] = {name: getattr(stats.expected, name) for name, _ in abi.ExpectedError._fields_}
         return values
 

@@ -202,10 +202,10 @@ class CloudCache:
         return cloud
 
     def obtain_linked(self, source: linked.Source, progress: Progress) -> Steps[native.Cloud]:
-        """The cloud of a linked file as it is now."""
+        """The cloud of a linked file as it is now. One that is mapped is opened again once a picture lacked points of some file."""
         with self._lock:
             known, cloud = self._entries.pop(source.identity(), ((), None))
-            if cloud:
+            if cloud and cloud.losses in (None, native.losses()):
                 self._entries[source.identity()] = (known, cloud)
                 return cloud
         cloud = (yield from linked.steps(source, progress)).cloud

@@ -7,7 +7,8 @@ enum { MOST = 1 << 16 }; // bytes; a greater struct_size was never set
 
 static int check_size(const struct pt_handle *handle, const char *call, size_t size)
 {
-    if (size > sizeof size && size <= MOST)
+    // A structure ends with its alignment: what does not is no structure's size, and would end within a field, half an address.
+    if (size > sizeof size && size <= MOST && size % sizeof size == 0)
         return PATINA_OK;
     return pt_fail(handle, PATINA_ERROR_ARGUMENT, "%s: a descriptor's struct_size is %zu, it was not set to its size", call,
                    size);

@@ -249,6 +249,8 @@ int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input)
     return code;
 }
 
+#define MOST_POINTS (1ull << 48)
+
 int patina_grid_normals(const patina_grid_desc *given, patina_progress *progress, float *normals)
 {
     patina_grid_desc taken;
@@ -258,6 +260,9 @@ int patina_grid_normals(const patina_grid_desc *given, patina_progress *progress
         return wrong;
     if (!given || (desc->count && !(desc->position && desc->column && desc->row && normals)))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grid_normals: bad arguments");
+    if (desc->count > MOST_POINTS)
+        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "patina_grid_normals: %llu points are more than any array holds",
+                       (unsigned long long)desc->count);
     struct pt_scan scan = {.count = desc->count};
     struct pt_grid g = {.scan = &scan, .position = desc->position};
     memcpy(g.station, desc->station, sizeof g.station);

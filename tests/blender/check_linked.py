@@ -13,7 +13,7 @@ from harness import SCRATCH, check, check_close, new_scene, patina, points_of, r
 from mathutils import Matrix
 from patina import native, preferences
 from patina.importers import las, library
-from patina.sync import cache, linked
+from patina.sync import cache, clouds, linked
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
 
@@ -183,6 +183,29 @@ def test_saved_clouds_that_are_replaced():
     obj.matrix_world = Matrix.Identity(4)
     saved("again.cloud", near)
     check((render()["Combined"][..., 3] > 0).mean() > 0.05, "a cloud of elsewhere is not seen")
+
+
+def test_file_that_is_cut_short():
+    """A linked cloud whose file is cut short while it is drawn: the rest is drawn, Blender goes on, and all of it is drawn once the file is
+    back, with the time stamp that it had."""
+    new_scene()
+    path = saved("cut.cloud", dense("cut.ply", 60000))
+    import_ply(path, link=True)
+    first, (cloud,) = render(), [cloud for _, cloud in clouds.CACHE._entries.values()]
+    whole, status, before = path.read_bytes(), path.stat(), native.losses()
+    os.truncate(path, len(whole) // 3)
+    with native.Device("cpu") as device, native.Scene() as scene, native.Frame(device) as frame:
+        scene.add_cloud(cloud)
+        scene.set_camera(world_from_camera=(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1), left=-.5, right=.5, bottom=-.5, top=.5,
+                         near_clip=.1, far_clip=100)
+        scene.set_settings(width=160, height=120)
+        frame.render(scene)
+        check(frame.stats()["points_lost"] > 0 and native.losses() > before, "points are lost")
+    lines = [text for _, text in native.log_lines() if "cut.cloud" in text]
+    check(len(lines) == 1, f"one line names the file: {lines}")
+    path.write_bytes(whole)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    check((render()["Combined"] == first["Combined"]).all(), "drawn as before once it is back")
 
 
 def test_missing_file():

@@ -251,3 +251,22 @@ def test_convert_is_killed():
         assert out.read_bytes() in (b"before", wanted), i
     cli.run("convert", "long.ply", "out.cloud")
     assert out.read_bytes() == wanted and not left("out.cloud"), left("out.cloud")
+
+
+def test_a_file_that_is_cut_short_meanwhile():
+    """The picture lacks its points, one line names the file, and the exit status says so."""
+    cloud = cli.FOLDER / "cut.cloud"
+    cli.run("convert", cli.ball("cut.ply", 60000), cloud.name)
+    whole = cloud.read_bytes()
+    drawing = subprocess.Popen([*cli.PATINA, "render", cloud.name, "-o", "cut.png", "--size", "64x64", "--device", "cpu", "--repeat", "60"],
+                               cwd=cli.FOLDER, stderr=subprocess.PIPE, text=True)
+    for line in drawing.stderr:
+        if "cut.png" in line:  # the first picture is done
+            os.truncate(cloud, len(whole) // 2)
+            break
+    said = drawing.stderr.read()
+    assert drawing.wait(120) == 1, (drawing.returncode, said)
+    named = [line for line in said.splitlines() if "cut.cloud" in line]
+    assert len(named) == 1 and "cannot be read any more" in named[0], said
+    cloud.write_bytes(whole)
+    cli.run("render", cloud.name, "-o", "cut.png", "--size", "64x64")
