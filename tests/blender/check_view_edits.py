@@ -295,7 +295,7 @@ def soft_numbers():
     """Of the active object; none yet: zeros."""
     data = bpy.context.view_layer.objects.active.data
     found = data.attributes.get("soft")
-    values = np.zeros(len(data.vertices), np.float32)
+    values = np.zeros(len(data.vertices if hasattr(data, "vertices") else data.points), np.float32)  # of a mesh or a point cloud
     if found:
         found.data.foreach_get("value", values)
     return values.reshape(ROWS, ROWS)
