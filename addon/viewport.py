@@ -239,7 +239,7 @@ class Viewport:
             self._steps.close()
         self._others = []
         self._sky = sky.Sky()
-        self._drawn = self._frame = self._dots = self._steps = self._task = self._bettered = None  # here, for textures go on Blender's thread
+        self._drawn = self._frame = self._dots = self._steps = self._task = self._bettered = self._chosen_batch = None  # here, for textures go on Blender's thread
         ANALYSES.wish(self, [])
         _VIEWPORTS.discard(self)
         if self in _TURNS:

@@ -9,6 +9,7 @@ import numpy as np
 from check_edits import ROWS, chosen, wall
 from check_import import import_ply
 from harness import Skip, check
+from patina import point_data
 from patina.sync import edits
 from window import area, newer, screenshot, settled, setup, shown, window_region
 
@@ -295,7 +296,7 @@ def soft_numbers():
     """Of the active object; none yet: zeros."""
     data = bpy.context.view_layer.objects.active.data
     found = data.attributes.get("soft")
-    values = np.zeros(len(data.vertices if hasattr(data, "vertices") else data.points), np.float32)  # of a mesh or a point cloud
+    values = np.zeros(point_data.count_of(data), np.float32)
     if found:
         found.data.foreach_get("value", values)
     return values.reshape(ROWS, ROWS)
