@@ -177,9 +177,7 @@ def download(folder: Path, command: list[str] | None = None) -> Iterator[str]:
     """Fetches the wheels of the missing packages into the folder with pip, which installs nothing. Yields texts of what it does.
     ReadersError when there is no pip or no way to PyPI, or when PyPI has none of the wheels for this Python. Closing it ends pip."""
     if command is None:
-        if importlib.util.find_spec("pip") is None:
-            raise ReadersError(f"this Blender's Python has no pip. {by_hand()}")
-        command = [sys.executable, "-m", "pip"]
+        command = _pip_command()
     names, none = wanted(), []
     for index, name in enumerate(names):
         words = [*command, "download", "--disable-pip-version-check", "--progress-bar", "off", "--no-input", "--no-deps",
@@ -193,6 +191,23 @@ def download(folder: Path, command: list[str] | None = None) -> Iterator[str]:
         yield f"No wheels of {', '.join(none)}"
     if none == names:
         raise ReadersError(f"PyPI has no wheel of {', '.join(none)} for Python {_python()} on this system yet. {WITHOUT}")
+
+
+def _pip_command() -> list[str]:
+    """This Python's pip; else the one that Python's ensurepip or the system would install, run from its wheel."""
+    if importlib.util.find_spec("pip"):
+        return [sys.executable, "-m", "pip"]
+    for folder in _wheels_of_pip():
+        found = sorted(folder.glob("pip-*.whl"))
+        if found:
+            return [sys.executable, str(found[-1] / "pip")]
+    raise ReadersError(f"this Blender's Python has no pip. {by_hand()}")
+
+
+def _wheels_of_pip() -> list[Path]:
+    known = importlib.util.find_spec("ensurepip")
+    own = [Path(known.origin).parent / "_bundled"] if known and known.origin else []
+    return [*own, Path("/usr/share/python-wheels")]
 
 
 def _pip(words: list[str], doing: str) -> Generator[str, None, str]:

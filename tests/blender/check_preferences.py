@@ -190,6 +190,25 @@ def test_readers_by_pip():
         operators.PIP = None
 
 
+def test_pip_from_its_wheel():
+    """A Python without pip has the wheel that ensurepip would install, or there is a sentence."""
+    folder = SCRATCH / "wheels of pip"
+    folder.mkdir(exist_ok=True)
+    honest = importlib.util.find_spec
+    with mock.patch.object(importlib.util, "find_spec", lambda name, *rest: None if name == "pip" else honest(name, *rest)), \
+            mock.patch.object(readers, "_wheels_of_pip", lambda: [folder]):
+        try:
+            readers._pip_command()
+        except readers.ReadersError as error:
+            check("has no pip" in str(error) and "Install from Files" in str(error), str(error))
+        else:
+            check(False, "there is none")
+        with zipfile.ZipFile(folder / "pip-99.0-py3-none-any.whl", "w") as archive:
+            archive.writestr("pip/__main__.py", "print('pip of a wheel')\n")
+        done = subprocess.run(readers._pip_command(), capture_output=True, text=True, check=False)
+        check("pip of a wheel" in done.stdout, done.stderr[-300:])
+
+
 def test_a_package_of_another_python_is_missing():
     """The zip's lazrs holds modules of some Pythons. On another one it is missing, and what is installed then comes first."""
     with without_readers("lazrs"):
