@@ -130,6 +130,17 @@ class Written(unittest.TestCase):
         np.testing.assert_array_equal(early, forest.score(bins, 5))
         self.assertLess(train.size_of(forest), train.MOST_BYTES)
 
+    def test_constants_are_of_today(self) -> None:
+        """What the library was built with was made from today's scenes, scanners and trainer."""
+        text = train.CONSTANTS.read_text() if train.CONSTANTS.is_file() else ""
+        if "tests/truth/trust/train.py" not in text:
+            print(f"skip test_constants_are_of_today: {train.CONSTANTS} was not written by train.py")
+            self.skipTest("not written by train.py")
+        sum_, _, names, scenes = train.told(text)
+        self.assertEqual(samples.checked(scenes), scenes)
+        self.assertEqual(names, train.names_of_features("library"))
+        self.assertEqual(sum_, train.made_from(names, scenes), "train again: tests/truth/trust/train.py")
+
     def test_default_threshold(self) -> None:
         """Of each scene at most a hundredth of the right samples lies below, and of one more than that if it were one higher."""
         random = np.random.default_rng(5)
