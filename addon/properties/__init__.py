@@ -285,7 +285,7 @@ class PatinaObjectProperties(PropertyGroup):
         name="Unclassified", override=_OVERRIDE, default=False,
         description="Points of the classes 0, never classified, and 1, unassigned, are not drawn and cast no shadow")
     least_trust: FloatProperty(
-        name="Trust", override=_OVERRIDE, default=0.78, min=0.0, max=1.0, subtype='FACTOR',
+        name="Trust", override=_OVERRIDE, default=0.64, min=0.0, max=1.0, subtype='FACTOR',
         description="Points of less trust are not drawn and cast no shadow. Trust is the probability that a point lies on a surface, "
                     "and is no mixed pixel or stray. 0: all points are drawn")
     opacity: FloatProperty(

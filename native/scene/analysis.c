@@ -332,6 +332,8 @@ static void walk_touched(void *context, uint32_t begin, uint32_t end, uint32_t t
 // Judges all points; those whose neighborhoods held untrusted ones are described again without these.
 static int judge(struct walk *walk, struct pt_pool *pool)
 {
+    if (walk->k < PT_TRUST_NEIGHBOURS)
+        pt_trust_measure(&walk->trust, pool);
     pt_trust_judge(&walk->trust, pool);
     if (pt_progress_cancelled(walk->progress))
         return PATINA_ERROR_CANCELLED;

@@ -75,6 +75,27 @@ void pt_trust_note(struct pt_trust *trust, uint32_t place, const struct pt_sampl
     trust->used[place] = count ? byte_of(sqrt(sample->square[count - 1]), trust->base) : 0;
 }
 
+static void measure_leaves(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct pt_trust *trust = context;
+    struct pt_found found;
+    (void)thread;
+    for (uint32_t leaf = begin; leaf < end && !pt_progress_cancelled(trust->progress); leaf++) {
+        const uint32_t lanes = pt_leaf_lanes(trust->tree, leaf);
+        pt_neighbours_find(trust->tree, trust->tree, leaf, lanes, K, &found);
+        for (uint32_t left = lanes; left; left &= left - 1) {
+            const uint32_t lane = (uint32_t)__builtin_ctz(left);
+            if (found.count[lane] == K)
+                trust->reach[leaf * PT_LEAF + lane] = byte_of(sqrt(found.square[lane][K - 1]), trust->base);
+        }
+    }
+}
+
+void pt_trust_measure(struct pt_trust *trust, struct pt_pool *pool)
+{
+    pt_parallel(pool, trust->tree->leaf_count, 64, measure_leaves, trust);
+}
+
 // ---- features --------------------------------------------------------------------------------------------------------------
 
 struct around { // of a point's nearest K

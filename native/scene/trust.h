@@ -32,6 +32,8 @@ void pt_trust_destroy(struct pt_trust *trust);
 
 // Stores how far the neighbors of a place reach. sample: nearest first, at least PT_TRUST_NEIGHBOURS where the cloud has these.
 void pt_trust_note(struct pt_trust *trust, uint32_t place, const struct pt_sample *sample);
+// For walks whose samples hold fewer points than PT_TRUST_NEIGHBOURS: stores the reach of all points.
+void pt_trust_measure(struct pt_trust *trust, struct pt_pool *pool);
 // Writes the trust of every point into the shape words, and the features into desc->trust_features where wanted.
 void pt_trust_judge(struct pt_trust *trust, struct pt_pool *pool);
 // Takes untrusted points out of both trees. 0 or PATINA_ERROR_MEMORY. pt_trust_show puts them back.

@@ -8,6 +8,7 @@
 
 struct columns {
     uint64_t count;
+    int trusted; // untrusted points are left out of the file
     float *position, *normal, *spacing, *half_axes, *sigma, *trust;
     uint8_t *kind, *seen_through;
 };
@@ -39,6 +40,16 @@ static void release(struct columns *c)
     free(c->seen_through);
 }
 
+static int is_left_out(const struct columns *c, uint64_t i) { return c->trusted && c->trust[i] < PATINA_TRUST_DEFAULT; }
+
+static uint64_t count_written(const struct columns *c)
+{
+    uint64_t count = 0;
+    for (uint64_t i = 0; i < c->count; i++)
+        count += !is_left_out(c, i);
+    return count;
+}
+
 static char *put(char *at, const void *bytes, size_t size)
 {
     memcpy(at, bytes, size);
@@ -52,6 +63,8 @@ static int write_rows(FILE *file, const struct columns *c, const double origin[3
     for (uint64_t first = 0; first < c->count && good; first += ROWS) {
         char *at = block;
         for (uint64_t i = first; i < c->count && i < first + ROWS; i++) {
+            if (is_left_out(c, i))
+                continue;
             for (int k = 0; k < 3; k++) {
                 const double place = origin[k] + (double)c->position[3 * i + (uint64_t)k];
                 at = wide ? put(at, &place, 8) : put(at, &c->position[3 * i + (uint64_t)k], 4);
@@ -64,7 +77,7 @@ static int write_rows(FILE *file, const struct columns *c, const double origin[3
             at = put(at, &c->kind[i], 1);
             at = put(at, &c->seen_through[i], 1);
         }
-        good = fwrite(block, (size_t)(at - block), 1, file) == 1;
+        good = at == block || fwrite(block, (size_t)(at - block), 1, file) == 1;
     }
     free(block);
     return good;
@@ -86,7 +99,7 @@ static int write_ply(const char *path, const struct columns *c, const double ori
         "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
         "radius\nproperty float radius_minor\nproperty float sigma\nproperty float trust\nproperty uchar kind\nproperty "
         "uchar seen_through\nend_header\n",
-        __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)c->count, type,
+        __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)count_written(c), type,
         type, type);
     int good = write_rows(file, c, origin, wide) && !ferror(file);
     return pt_whole_end(&whole, good);
@@ -141,6 +154,10 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, int gri
     } else if (!code) {
         for (int i = 0; i < 6; i++)
             printf("%-12s %llu\n", tool_kinds[i], (unsigned long long)built.kinds[i]);
+        uint64_t untrusted = 0;
+        for (uint64_t i = 0; i < columns->count; i++)
+            untrusted += columns->kind[i] && columns->trust[i] < PATINA_TRUST_DEFAULT;
+        printf("%-12s %llu\n", "untrusted", (unsigned long long)untrusted);
         if (desc.free_space)
             printf("seen_through %llu\n", (unsigned long long)built.seen_through);
     }
@@ -178,6 +195,7 @@ int tool_analyse(int count, char **arguments)
     double neighbours = 0;
     uint64_t memory = 0;
     int grid = 0;
+    struct columns columns = {0};
     for (int i = 0; i < count; i++) {
         const char *value = i + 1 < count ? arguments[i + 1] : NULL;
         if (arguments[i][0] != '-') {
@@ -189,6 +207,8 @@ int tool_analyse(int count, char **arguments)
             i++;
         } else if (!strcmp(arguments[i], "--grid")) {
             grid = 1;
+        } else if (!strcmp(arguments[i], "--trusted")) {
+            columns.trusted = 1;
         } else if (!strcmp(arguments[i], "--neighbours") && value) {
             if (parse_numbers(value, &neighbours, 1, 1) < 0 || neighbours < 3 || neighbours > 64)
                 return tool_misuse("'%s' is no value for option '--neighbours': 3 to 64", value);
@@ -204,10 +224,9 @@ int tool_analyse(int count, char **arguments)
     if (!in || !out || !*out)
         return tool_misuse("analyse: a file to read, and -o OUT.ply, please");
     const int whole = ends_in(out, ".cloud");
-    if (whole != ends_in(in, ".cloud") || (whole && grid) || (!whole && memory))
-        return tool_misuse("analyse: of IN.cloud -o OUT.cloud, with --memory and without --grid; of any other file -o OUT.ply");
+    if (whole != ends_in(in, ".cloud") || (whole && (grid || columns.trusted)) || (!whole && memory))
+        return tool_misuse("analyse: of IN.cloud -o OUT.cloud, with --memory and without --grid or --trusted; of any other file -o OUT.ply");
     patina_progress *progress = NULL;
-    struct columns columns = {0};
     const int code = patina_progress_create(&progress);
     tool_cancellable(progress, NULL);
     const int result = code    ? tool_failed(in, NULL, code)

@@ -35,6 +35,7 @@ static const struct topic {
      "  --pack on|off                      convert to .cloud: positions of 8 bytes instead of 12. Points move by less\n"
      "                                     than a millionth of a chunk's width; says by how much (off)\n"
      "  --order keep|drop                  convert to .cloud: drop the order of the points, 4 bytes per point less (keep)\n"
+     "  --trusted                          analyse: leave points of low trust out of the file\n"
      "  --neighbours K                     analyse: 3 to 64 neighbors (16, and 48 where 16 leave doubts)\n"
      "  --grid                             analyse: use the rows and columns of scans, with their true borders\n",
      0},

@@ -98,7 +98,7 @@ def test_what_is_hidden_follows():
     found = shown()
     covered = [float((found.shown.color[..., 3] > 0).mean())]
     built = found.shown.clouds[0].cloud
-    for name, value in (("largest_gap", 0.02), ("least_trust", 0.78)):
+    for name, value in (("largest_gap", 0.02), ("least_trust", 0.64)):
         before = found.pictures
         setattr(obj.patina, name, value)
         yield lambda: newer(before)() and settled(3001)

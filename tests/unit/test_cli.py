@@ -119,6 +119,9 @@ def test_analyse_writes_columns():
                      "seen_through"], names
     assert b"element vertex 3000" in header and len(rows) % 3000 == 0
     assert "points      3000" in run("info", "known.ply").stdout
+    assert 0 <= int(counts["untrusted"]) < 10, counts
+    run("analyse", "analyse.ply", "-o", "trusted.ply", "--neighbours", "12", "--trusted")
+    assert f"points      {3000 - int(counts['untrusted'])}" in run("info", "trusted.ply").stdout
     for arguments in (["analyse"], ["analyse", "analyse.ply"], ["analyse", "analyse.ply", "-o", "x.ply", "--neighbours", "99"]):
         run(*arguments, code=2)
 

@@ -245,7 +245,7 @@ enum patina_kind {
 // Numbers of patina_analysis_desc.trust_features: scene/trust_features.h lists them.
 #define PATINA_TRUST_FEATURES 33
 // The least trust of points that are drawn by default: at most 1 % of the right samples of any scene for tuning have less.
-#define PATINA_TRUST_DEFAULT 0.78f
+#define PATINA_TRUST_DEFAULT 0.64f
 
 typedef struct patina_analysis_desc {
     size_t struct_size;
