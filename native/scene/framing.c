@@ -73,7 +73,7 @@ static int keep_instance(const patina_scene *scene, const struct pt_instance *in
         for (uint32_t c = 0; boxes && c < cloud->chunk_count; c++)
             if (boxes[c].lower[0] <= boxes[c].upper[0] &&
                 pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY) {
-                f->around = pt_chunk_reach(scene, instance, &cloud->chunks[c], scale);
+                f->around = pt_chunk_reach(scene, instance, &cloud->chunks[c], scale, 0);
                 pt_box_corners(boxes[c].lower, boxes[c].upper, instance->style.world_from_object, keep_corner, f);
             }
         f->around = 0.0;

@@ -65,11 +65,11 @@ double pt_ball_reach(const struct patina_scene *scene, const struct pt_instance 
 }
 
 double pt_chunk_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_chunk *chunk,
-                      double scale)
+                      double scale, int most)
 {
     const int discs = !pt_all_soft(instance) && (scene->settings.surface == PATINA_SURFACE_SPLATS ||
                                                  (scene->settings.surface == PATINA_SURFACE_AUTO && instance->cloud->shapes));
-    const double disc = discs ? pt_disc_reach(scene, instance, chunk, scale, 1) : 0.0,
+    const double disc = discs ? pt_disc_reach(scene, instance, chunk, scale, most) : 0.0,
                  ball = instance->style.soft ? pt_ball_reach(scene, instance, chunk, scale) : 0.0;
     return fmax(disc, ball);
 }
@@ -80,6 +80,6 @@ double pt_instance_reach(const struct patina_scene *scene, const struct pt_insta
     const double scale = pt_stretch(instance->style.world_from_object);
     double most = 0.0;
     for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < cloud->chunk_count; c++)
-        most = fmax(most, pt_chunk_reach(scene, instance, &cloud->chunks[c], scale));
+        most = fmax(most, pt_chunk_reach(scene, instance, &cloud->chunks[c], scale, 1));
     return most;
 }

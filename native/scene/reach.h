@@ -18,9 +18,10 @@ double pt_ball_reach(const struct patina_scene *scene, const struct pt_instance 
                      double scale);
 // World units of a ball whose radius is 1 in the cloud.
 double pt_ball_scale(const struct patina_scene *scene, const struct pt_instance *instance, double scale);
-// Of whatever the scene's settings and the instance's style may draw of the chunk. At least as much as any plan takes.
+// Of whatever the scene's settings and the instance's style may draw of the chunk. most: at least as much as any plan takes; else, of discs,
+// what nine of ten stay below, which frames a picture.
 double pt_chunk_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_chunk *chunk,
-                      double scale);
+                      double scale, int most);
 // The most of all chunks that are there.
 double pt_instance_reach(const struct patina_scene *scene, const struct pt_instance *instance);
 
