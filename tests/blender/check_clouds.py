@@ -267,6 +267,8 @@ def test_material_shows_the_colors():
     """In other engines, as in Material Preview."""
     needs_clouds()
     scene = new_scene()
+    for material in list(bpy.data.materials):
+        bpy.data.materials.remove(material)
     try:
         scene.render.engine = 'CYCLES'
     except TypeError:
