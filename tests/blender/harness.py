@@ -83,7 +83,7 @@ _status, _Engine._status = _Engine._status, _record_status
 def new_scene(width=64, height=48):
     """Empties the file; a camera at the origin that looks down -z, no filters, transparent film, all passes."""
     for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.pointclouds, bpy.data.lights, bpy.data.cameras, bpy.data.worlds,
-                       bpy.data.collections, bpy.data.node_groups, bpy.data.materials):
+                       bpy.data.collections, bpy.data.node_groups):
         for item in list(collection):
             collection.remove(item)
     old = list(bpy.data.scenes)
