@@ -360,11 +360,12 @@ class Viewport:
         shader.uniform_sampler("picture", self._drawn[2])
         shader.uniform_float("transform", context.region_data.perspective_matrix)
         shader.uniform_float("region", (x0, y0, x1 - x0, y1 - y0))
-        tint = Color(theme.vertex_select).from_srgb_to_scene_linear()  # the overlays' framebuffer turns it back
-        shader.uniform_float("tint", (*tint, 1.0))
+        red, green, blue = (round(255.0 * part) for part in Color(theme.vertex_select).from_srgb_to_scene_linear())  # turned back by the framebuffer
         depths = self._depths(context, SHOWN)
         shader.uniform_float("offset", (depths["cover"], depths["rounding"], depths["away"], (theme.vertex_size + 1.0) * scale))
-        shader.uniform_float("projection", depths["projection"])
+        *projection, orthographic = depths["projection"]
+        packed = 1.0 + red + 256.0 * green + 65536.0 * blue
+        shader.uniform_float("projection", (*projection, packed if orthographic else -packed))
         self._chosen_batch.draw(shader)
         gpu.state.program_point_size_set(False)
 
@@ -752,7 +753,8 @@ void main()
     vec2 off = gl_PointCoord - 0.5;
     if (dot(off, off) > 0.25)
         discard;
-    color = vec4(tint.rgb, 1.0);
+    float code = abs(projection.w) - 1.0;
+    color = vec4(mod(code, 256.0), mod(floor(code / 256.0), 256.0), floor(code / 65536.0), 255.0) / 255.0;
 #elif defined(DEPTH) || defined(ERASE)
     float far = exact().r;
 #if defined(ERASE)
@@ -804,8 +806,8 @@ def _create(kind: str) -> gpu.types.GPUShader:
             info.depth_write('ANY')
     info.sampler(0, 'FLOAT_2D', "picture")
     if kind == 'CHOSEN':
-        info.push_constant('MAT4', "transform")  # with the others 128 bytes, which all devices allow
-        for name in ("offset", "region", "tint"):
+        info.push_constant('MAT4', "transform")  # with the others below the 128 bytes that all devices allow
+        for name in ("offset", "region"):
             info.push_constant('VEC4', name)
         info.vertex_in(0, 'VEC3', "pos")
     else:
