@@ -21,7 +21,7 @@ from address import is_address, is_ept, last_of
 from web import Slow, SourceError, Unreachable
 
 TIMEOUT = 10.0  # seconds without a byte, or for web.PACE bytes
-TRIES, SLOW_TRIES = 3, 2  # of any request, and of one that gets no answer in time
+TRIES = 3
 WAIT = 0.5  # seconds before the second one, twice as long before each further one
 HEAD = 589  # bytes of a file that are looked at first: the head of a COPC, and its record
 MOST_WAIT = 30.0  # seconds that a server may ask to wait before the next try
@@ -187,10 +187,8 @@ class _Web(Source):
                 return self._fetch(address, part, most, known)
             except web.Refused as error:
                 raise SourceError(str(error)) from None
-            except Slow as error:  # each try takes as long
-                if attempt + 1 >= SLOW_TRIES:
-                    raise
-                why, kind = str(error), Unreachable
+            except Slow:  # another try would take as long
+                raise
             except web.Busy as error:
                 why, kind = str(error), Unreachable
                 if (error.wait or 0.0) > MOST_WAIT:

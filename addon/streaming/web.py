@@ -3,7 +3,7 @@
 that streams.
 
 A socket's timeout alone bounds no request: a server may send a byte now and then, or "100 Continue" for ever. A thread watches all requests,
-and shuts a connection down that has not received PACE more bytes in each timeout (10 s: 2 kB/s).
+and shuts a connection down that gets less than PACE bytes in each timeout (10 s: 2 kB/s) after the first three.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from typing import Any
 REDIRECTS = 5
 PACE = 20_000  # bytes for which a request may take another timeout
 LOOK = 0.05  # seconds between two looks at the requests
+TIMEOUTS = 3  # that a request may take before its first PACE bytes are there
 PIECE = 1 << 16
 
 
@@ -36,7 +37,7 @@ class Unreachable(SourceError):
 
 
 class Slow(Unreachable):
-    """Nobody answered in time: another try would take as long."""
+    """What arrives arrives too slowly: another try would take as long."""
 
 
 class Refused(Exception):
@@ -97,7 +98,7 @@ class _Watch:
                 while not self._requests:
                     self._change.wait()
                 for request in self._requests:
-                    if time.monotonic() - request.began > request.timeout * (1 + request.received / PACE):
+                    if time.monotonic() - request.began > request.timeout * (TIMEOUTS + request.received / PACE):
                         request.late = True
                         for copy in request.sockets:
                             with contextlib.suppress(OSError):
@@ -155,8 +156,10 @@ def fetch(address: str, headers: dict[str, str], most: int, timeout: float) -> A
             return _follow(address, headers, most, timeout, request)
         except (OSError, http.client.HTTPException, ValueError) as error:
             reason = getattr(error, "reason", error)
-            if request.late or isinstance(reason, TimeoutError) or "timed out" in str(reason):
+            if request.late:
                 raise _slow(request) from None
+            if isinstance(reason, TimeoutError) or "timed out" in str(reason):
+                raise Unreachable("the server does not answer in time") from None
             raise
 
 
