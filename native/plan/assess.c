@@ -38,12 +38,11 @@ void pt_plan_assess(struct pt_builder *builder)
         args.view = plan->view;
         memcpy(args.view.rect, args.first ? whole : part, sizeof part);
         args.instance = instance->args;
-        PT_REASON(PT_ADD(builder, assess, args,
-                         {pt_plane_at(PT_PLANE_KEYS, 0), pt_shapes_of(instance, i),
-                          pt_plane_if(args.trust != 0, PT_PLANE_TRUST, 0),
-                          pt_plane_if(args.thickness != 0, PT_PLANE_THICKNESS, 0)}),
-                  "of instance %u are asked for:%s%s", i, args.trust ? " trust" : "",
-                  args.thickness ? " thickness" : "");
+        PT_REASON(
+            PT_ADD(builder, assess, args,
+                   {pt_plane_at(PT_PLANE_KEYS, 0), pt_shapes_of(instance, i), pt_plane_if(args.trust != 0, PT_PLANE_TRUST, 0),
+                    pt_plane_if(args.thickness != 0, PT_PLANE_THICKNESS, 0)}),
+            "of instance %u are asked for:%s%s", i, args.trust ? " trust" : "", args.thickness ? " thickness" : "");
         args.first = 0;
         plan->assessed |= asked;
     }

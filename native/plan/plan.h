@@ -80,7 +80,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(SOFT_BINS, bins, BINS, ONE, 0)                                                                                           \
     X(SOFT_REACHED, f32, WINDOW, ONE, 0)                                                                                       \
     X(VEIL, f32, VEILS, ONE, 0)                                                                                                \
-    X(TRUST, f32, CROP, ONE, 0)                                                                                            \
+    X(TRUST, f32, CROP, ONE, 0)                                                                                                \
     X(THICKNESS, f32, CROP, ONE, 0)                                                                                            \
     X(DENSITY, f32, CROP, ONE, 0)                                                                                              \
     X(DISAGREEMENT, f32, CROP, ONE, 0)                                                                                         \

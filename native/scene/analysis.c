@@ -79,7 +79,8 @@ static void look_from_afar(const struct pt_neighbours *tree, const struct pt_nei
 }
 
 void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t lanes,
-                      uint32_t k, struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context)
+                      uint32_t k, struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit,
+                      void *context)
 {
     const uint32_t wider = WIDER * k < PT_NEIGHBOURS_MOST ? WIDER * k : PT_NEIGHBOURS_MOST;
     struct pt_plane planes[PT_LEAF], wide;
@@ -203,7 +204,8 @@ static int lies_in_rows(const struct walk *walk)
     struct pt_neighbourhood hoods[PT_LEAF];
     uint64_t flat = 0, uneven = 0;
     for (uint32_t leaf = step / 2; leaf < leaves && !pt_progress_cancelled(walk->progress); leaf += step) {
-        pt_describe_leaf(&walk->tree, &walk->coarse, leaf, pt_leaf_lanes(&walk->tree, leaf), walk->k, &found, hoods, NULL, NULL);
+        pt_describe_leaf(&walk->tree, &walk->coarse, leaf, pt_leaf_lanes(&walk->tree, leaf), walk->k, &found, hoods, NULL,
+                         NULL);
         for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
             const struct pt_neighbourhood *hood = &hoods[__builtin_ctz(left)];
             flat += hood->kind == PT_KIND_SURFACE;
@@ -476,9 +478,15 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     if (!error)
         error = pt_neighbours_create(&walk->coarse, cloud, FAR_STRATA, walk->store, pool, walk->progress, 0.04, 0.05);
     if (!error) {
-        walk->trust = (struct pt_trust){.cloud = cloud, .tree = &walk->tree, .coarse = &walk->coarse, .desc = walk->desc,
-                                        .beams = &walk->beams, .chunks = out->chunks, .surfels = out->surfels,
-                                        .shapes = (_Atomic uint32_t *)out->shapes, .base = out->spacing_base,
+        walk->trust = (struct pt_trust){.cloud = cloud,
+                                        .tree = &walk->tree,
+                                        .coarse = &walk->coarse,
+                                        .desc = walk->desc,
+                                        .beams = &walk->beams,
+                                        .chunks = out->chunks,
+                                        .surfels = out->surfels,
+                                        .shapes = (_Atomic uint32_t *)out->shapes,
+                                        .base = out->spacing_base,
                                         .progress = walk->progress};
         error = pt_trust_create(&walk->trust);
     }
@@ -488,7 +496,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
         pt_neighbours_destroy(&walk->tree);
         return error;
     }
-    walk->tree.any_twins = walk->coarse.any_twins = 1; // a million points at one place take no longer than others
+    walk->tree.any_twins = walk->coarse.any_twins = 1;     // a million points at one place take no longer than others
     walk->rows = !walk->beams.count && lies_in_rows(walk); // a station's cells tell better
     pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
     error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : judge(walk, pool);

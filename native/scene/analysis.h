@@ -50,6 +50,7 @@ typedef void pt_limit(void *context, uint32_t place, const struct pt_sample *sam
 
 // The lanes of a leaf described: neighbours, plane, kind; then limited, where limit is not NULL. found is room to work in.
 void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t lanes,
-                      uint32_t k, struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context);
+                      uint32_t k, struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit,
+                      void *context);
 
 #endif

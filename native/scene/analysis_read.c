@@ -137,7 +137,7 @@ static void clear(const patina_neighbourhoods *to, size_t count)
     const struct {
         void *data;
         size_t size;
-    } arrays[] = {{to->normal, 12}, {to->axis, 12},     {to->spacing, 4},     {to->half_axes, 8},   {to->sigma, 4},
+    } arrays[] = {{to->normal, 12}, {to->axis, 12}, {to->spacing, 4},     {to->half_axes, 8},   {to->sigma, 4},
                   {to->kind, 1},    {to->trust, 4}, {to->soft_radius, 4}, {to->uncertainty, 4}, {to->seen_through, 1}};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         if (arrays[i].data)

@@ -69,10 +69,7 @@ uint32_t pt_trusted_from(const struct pt_instance *instance)
     return untrusted && untrusted < below(info, PT_TRUST_LEVELS) ? level : 0;
 }
 
-uint64_t pt_untrusted(const struct pt_instance *instance)
-{
-    return below(&instance->cloud->info, pt_trusted_from(instance));
-}
+uint64_t pt_untrusted(const struct pt_instance *instance) { return below(&instance->cloud->info, pt_trusted_from(instance)); }
 
 int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8])
 {

@@ -21,7 +21,15 @@
 #include <string.h>
 
 // Files of version 12 do not count levels of trust, which their analysis does not have. Files of version 11 are neither packed nor without order, those of 10 have no sums of pages either.
-enum { SECTION = 1 << 16, VERSION = 13, UNTRUSTED = 12, UNPACKED = 11, WITHOUT_PAGES = 10, SECTIONS = PT_ARRAYS, PIECE = 1 << 22 };
+enum {
+    SECTION = 1 << 16,
+    VERSION = 13,
+    UNTRUSTED = 12,
+    UNPACKED = 11,
+    WITHOUT_PAGES = 10,
+    SECTIONS = PT_ARRAYS,
+    PIECE = 1 << 22
+};
 enum { INFO_BYTES = offsetof(patina_cloud_info, packed) }; // of what a cloud tells; the header has the rest
 static const char magic[8] = {'p', 'a', 't', 'i', 'n', 'a', '\n', '\x1a'};
 
@@ -41,7 +49,8 @@ struct header {
     uint32_t packed, unordered;
     uint64_t trusts[16]; // points of each level
 };
-_Static_assert(INFO_BYTES % 8 == 0 && sizeof(struct header) == offsetof(struct header, page_sum) + 24 + 128, "a header has no holes");
+_Static_assert(INFO_BYTES % 8 == 0 && sizeof(struct header) == offsetof(struct header, page_sum) + 24 + 128,
+               "a header has no holes");
 
 static size_t tail_size(const struct header *header)
 {
@@ -399,7 +408,8 @@ static int check_version(const char *path, const struct header *header, const pa
 {
     if (memcmp(header->magic, magic, sizeof magic))
         return refuse(path, "not a saved cloud");
-    if ((header->version != VERSION && header->version != UNTRUSTED && header->version != UNPACKED && header->version != WITHOUT_PAGES) ||
+    if ((header->version != VERSION && header->version != UNTRUSTED && header->version != UNPACKED &&
+         header->version != WITHOUT_PAGES) ||
         header->chunk_size != sizeof(struct pt_chunk) || info->struct_size != INFO_BYTES)
         return refuse(path, "a saved cloud of another version");
     return header->size == size ? PATINA_OK : refuse(path, "a saved cloud that was cut short");
@@ -516,7 +526,7 @@ static int move_by(struct patina_cloud *cloud, const double offset[3])
 // An analysis of an older version has no trust. The caller analyzes the cloud again, as one that never was.
 static void forget_analysis(const char *path, struct patina_cloud *cloud, const struct pt_section *shapes)
 {
-    pt_log(PT_LOG_INFO, "%s: saved by an older version. The points are analyzed again, for their trust.", path);
+    pt_log(PT_LOG_WARNING, "%s: saved by an older version. The points are analyzed again, for their trust.", path);
     pt_pages_free(cloud->shapes, shapes->size);
     cloud->shapes = NULL;
     cloud->mapped &= ~(1u << PT_ARRAY_SHAPES);

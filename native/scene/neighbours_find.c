@@ -13,8 +13,9 @@
 #endif
 
 struct walk {
-    _Alignas(64) double place[3][PT_LEAF];   // of the lanes, in the frame that is walked
-    _Alignas(64) double worst[PT_LEAF];      // square of the distance to the k-th found; negative: a lane that does not look; DBL_MAX: fewer are found, and points at infinity are none
+    _Alignas(64) double place[3][PT_LEAF]; // of the lanes, in the frame that is walked
+    _Alignas(64) double worst
+        [PT_LEAF]; // square of the distance to the k-th found; negative: a lane that does not look; DBL_MAX: fewer are found, and points at infinity are none
     double middle[3];                        // of them: what is nearest to it is walked first
     const struct pt_neighbours *tree, *from; // that is walked, that the lanes are of
     struct pt_found *found;

@@ -19,7 +19,7 @@ enum { K = PT_TRUST_NEIGHBOURS, NEAR = 8 };
 
 struct pt_hidden {
     uint32_t place;
-    float at[3];   // relative to the chunk's origin
+    float at[3];     // relative to the chunk's origin
     uint32_t coarse; // place in the coarse tree, or NOWHERE
 };
 
@@ -255,7 +255,8 @@ static void write_features(const struct pt_trust *trust, uint32_t slot, const fl
 }
 
 // Where the cloud has fewer points, or all neighbors lie at one place, nothing speaks against the point.
-static uint32_t level_of(const struct pt_trust *trust, const struct pt_chunk *chunk, uint32_t place, const struct pt_found *found)
+static uint32_t level_of(const struct pt_trust *trust, const struct pt_chunk *chunk, uint32_t place,
+                         const struct pt_found *found)
 {
     const uint32_t lane = place % PT_LEAF, slot = trust->tree->slots[place];
     const uint32_t *places = found->place[lane];
@@ -472,8 +473,11 @@ uint32_t pt_trust_touched(const struct pt_trust *trust, uint32_t leaf)
 {
     const struct pt_neighbours *tree = trust->tree;
     const float *xyz = tree->places + (size_t)leaf * 3 * PT_LEAF;
-    struct touch touch = {.trust = trust, .leaf = leaf, .chunk = tree->leaf_chunk[leaf],
-                          .low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
+    struct touch touch = {.trust = trust,
+                          .leaf = leaf,
+                          .chunk = tree->leaf_chunk[leaf],
+                          .low = {INFINITY, INFINITY, INFINITY},
+                          .high = {-INFINITY, -INFINITY, -INFINITY}};
     for (uint32_t left = pt_leaf_lanes(tree, leaf); left; left &= left - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(left);
         const uint8_t used = trust->used[leaf * PT_LEAF + lane];

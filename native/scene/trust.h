@@ -14,14 +14,14 @@ struct pt_trust {
     struct pt_neighbours *tree, *coarse;
     const patina_analysis_desc *desc;
     const struct pt_beams *beams;
-    const struct pt_chunk *chunks;     // with the spacings that the first walk found
-    const uint32_t *surfels;           // slots
-    _Atomic uint32_t *shapes;          // slots; the judgement writes PT_SHAPE_TRUST_BITS alone
-    uint8_t *reach, *used;             // a place: distance to the 16th neighbor; to the farthest that described the point
-    double base;                       // unit of spacings
+    const struct pt_chunk *chunks; // with the spacings that the first walk found
+    const uint32_t *surfels;       // slots
+    _Atomic uint32_t *shapes;      // slots; the judgement writes PT_SHAPE_TRUST_BITS alone
+    uint8_t *reach, *used;         // a place: distance to the 16th neighbor; to the farthest that described the point
+    double base;                   // unit of spacings
     patina_progress *progress;
-    struct pt_hidden *hidden;          // untrusted points that are out of the trees, by chunk
-    uint32_t *hidden_first;            // a chunk, and one past the last
+    struct pt_hidden *hidden; // untrusted points that are out of the trees, by chunk
+    uint32_t *hidden_first;   // a chunk, and one past the last
     uint64_t hidden_count;
     atomic_uint done;
 };

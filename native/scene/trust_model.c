@@ -3,9 +3,9 @@
 #include "trust.h"
 #include "shared/words.h"
 
-struct node { // a tree lies in preorder: the left child follows, the right one lies `value` nodes on
-    float most;      // features up to this go left
-    int16_t value;   // of a leaf: its score
+struct node {         // a tree lies in preorder: the left child follows, the right one lies `value` nodes on
+    float most;       // features up to this go left
+    int16_t value;    // of a leaf: its score
     uint16_t feature; // LEAF: none
 };
 

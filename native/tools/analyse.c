@@ -93,14 +93,13 @@ static int write_ply(const char *path, const struct columns *c, const double ori
     if (error)
         return error;
     FILE *file = whole.stream;
-    fprintf(
-        file,
-        "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
-        "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
-        "radius\nproperty float radius_minor\nproperty float sigma\nproperty float trust\nproperty uchar kind\nproperty "
-        "uchar seen_through\nend_header\n",
-        __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)count_written(c), type,
-        type, type);
+    fprintf(file,
+            "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
+            "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
+            "radius\nproperty float radius_minor\nproperty float sigma\nproperty float trust\nproperty uchar kind\nproperty "
+            "uchar seen_through\nend_header\n",
+            __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(),
+            (unsigned long long)count_written(c), type, type, type);
     int good = write_rows(file, c, origin, wide) && !ferror(file);
     return pt_whole_end(&whole, good);
 }
@@ -225,7 +224,8 @@ int tool_analyse(int count, char **arguments)
         return tool_misuse("analyse: a file to read, and -o OUT.ply, please");
     const int whole = ends_in(out, ".cloud");
     if (whole != ends_in(in, ".cloud") || (whole && (grid || columns.trusted)) || (!whole && memory))
-        return tool_misuse("analyse: of IN.cloud -o OUT.cloud, with --memory and without --grid or --trusted; of any other file -o OUT.ply");
+        return tool_misuse(
+            "analyse: of IN.cloud -o OUT.cloud, with --memory and without --grid or --trusted; of any other file -o OUT.ply");
     patina_progress *progress = NULL;
     const int code = patina_progress_create(&progress);
     tool_cancellable(progress, NULL);

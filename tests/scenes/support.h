@@ -67,7 +67,7 @@ struct picture {
     uint32_t width, height;
     uint64_t *keys;
     float *combined, *depth, *normal, *source; // 4, 1, 3, 1 channels
-    float *trust, *thickness, *density;    // 1 channel each
+    float *trust, *thickness, *density;        // 1 channel each
     uint32_t layers;                           // kept as passes; whole pictures one after another:
     float *layer_combined, *layer_depth, *layer_normal;
 };

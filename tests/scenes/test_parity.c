@@ -50,8 +50,8 @@ static void compare(const struct picture *picture, const struct picture *truth, 
         support_die("%s, %s: normal at pixel %llu is %.9g, the first device has %.9g", name, scene,
                     (unsigned long long)where / 3, (double)picture->normal[where], (double)truth->normal[where]);
     if (farthest(picture->trust, truth->trust, pixels, &where) > 0.0)
-        support_die("%s, %s: trust at pixel %llu is %.9g, the first device has %.9g", name, scene,
-                    (unsigned long long)where, (double)picture->trust[where], (double)truth->trust[where]);
+        support_die("%s, %s: trust at pixel %llu is %.9g, the first device has %.9g", name, scene, (unsigned long long)where,
+                    (double)picture->trust[where], (double)truth->trust[where]);
     if (farthest(picture->thickness, truth->thickness, pixels, &where) > 0.0)
         support_die("%s, %s: thickness at pixel %llu is %.9g, the first device has %.9g", name, scene,
                     (unsigned long long)where, (double)picture->thickness[where], (double)truth->thickness[where]);

@@ -241,8 +241,7 @@ static void test_pictures(void **state)
             patina_device *device = support_device_open(support_device_name(k), 0, 0);
             if (!device)
                 continue;
-            patina_cloud_style style = {
-                .struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .least_trust = -1.0f};
+            patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .least_trust = -1.0f};
             const struct looked off = look(device, cloud, &style, NULL, marked);
             style.free_space = PATINA_FREE_SPACE_SHOW;
             const struct looked shown = look(device, cloud, &style, NULL, marked);

@@ -75,7 +75,8 @@ static void test_levels(void **state)
 }
 
 // Pixels that show something from straight above.
-static uint64_t shown_of(patina_device *device, const patina_cloud *cloud, float least, float depths[64 * 64], uint64_t *untrusted)
+static uint64_t shown_of(patina_device *device, const patina_cloud *cloud, float least, float depths[64 * 64],
+                         uint64_t *untrusted)
 {
     static float rgba[64][64][4];
     patina_scene *scene = NULL;
@@ -160,8 +161,8 @@ static void test_strays_vanish(void **state)
     for (int i = PLANE; i < PLANE + STRAYS; i++)
         found += trust[i] < PATINA_TRUST_DEFAULT;
     if (10 * found < 9 * STRAYS || 1000 * lost > PLANE)
-        fail_msg("%llu of %d strays are found, and %llu of %d others", (unsigned long long)found, STRAYS, (unsigned long long)lost,
-                 PLANE);
+        fail_msg("%llu of %d strays are found, and %llu of %d others", (unsigned long long)found, STRAYS,
+                 (unsigned long long)lost, PLANE);
     for (uint32_t k = 0; k < support_device_count(); k++) {
         patina_device *device = support_device_open(support_device_name(k), 0, 0);
         if (!device)

@@ -271,8 +271,9 @@ typedef struct patina_analysis_desc {
                        // lie in one
     uint32_t direction_count; // with grid, of scans whose beams are parallel, and whose place nobody knows: ...
     const double *directions; // ... in which each looked, 3 each, any length; 0 0 0: it has a station
-    float *trust_features;    // NULL, or PATINA_TRUST_FEATURES numbers of each point, `count` times, in the given order: what its trust
-                              // is found from, to train with. Points that are not drawn read 0. For patina_cloud_analyse
+    float *
+        trust_features; // NULL, or PATINA_TRUST_FEATURES numbers of each point, `count` times, in the given order: what its trust
+                        // is found from, to train with. Points that are not drawn read 0. For patina_cloud_analyse
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
@@ -394,9 +395,9 @@ typedef struct patina_cloud_style {
     // Of clouds that were analysed; nothing for others:
     uint32_t free_space;   // patina_free_space: what becomes of what a station saw through
     uint32_t hidden_kinds; // bits 1 << patina_kind: points that are not drawn and cast no shadow
-    float least_trust;     // points of less trust are not drawn and cast no shadow; 0 = PATINA_TRUST_DEFAULT, negative = all are
-                           // drawn. Where no point has as much, all are drawn, too, and the log says so
-    float largest_gap;     // world units; no disc is wider, whatever its radius; 0 = as wide as it is
+    float least_trust; // points of less trust are not drawn and cast no shadow; 0 = PATINA_TRUST_DEFAULT, negative = all are
+                       // drawn. Where no point has as much, all are drawn, too, and the log says so
+    float largest_gap; // world units; no disc is wider, whatever its radius; 0 = as wide as it is
     const patina_mask
         *mask; // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
                // the scene or the next patina_scene_clear, as the cloud must; the grade too
@@ -648,7 +649,7 @@ PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimu
     X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")                   \
     X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")                              \
     X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")                                   \
-    X(TRUST, 1, "0..1, of the nearest point, as analysed; 0 where nothing is known, or nothing is")                        \
+    X(TRUST, 1, "0..1, of the nearest point, as analysed; 0 where nothing is known, or nothing is")                            \
     X(THICKNESS, 1, "sigma of the nearest point's surface, world units; 0 where nothing is known, or nothing is")              \
     X(DENSITY, 1, "soft points before the surface, for each square of the world's unit across the pixel's ray; 0 without any") \
     X(DISAGREEMENT, 1, "of range images: how far apart the scans lie there along the normal, world units; 0: only one is there")
@@ -703,7 +704,7 @@ typedef struct patina_frame_stats {
     uint64_t mapped_read;     // by passes over points, each counted; what pixels ask of single points comes to it
     uint32_t mapped_rounds;   // of the pass over points that took most; 0 where nothing is mapped
     uint32_t mapped_returned; // how often all that was held was given back
-    uint64_t untrusted; // points of the scene that are left out for their trust: patina_cloud_style.least_trust
+    uint64_t untrusted;       // points of the scene that are left out for their trust: patina_cloud_style.least_trust
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
