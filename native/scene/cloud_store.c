@@ -535,7 +535,7 @@ static void move_by(struct patina_cloud *cloud, const double offset[3])
 // An analysis of an older version has no trust. The caller analyzes the cloud again, as one that never was.
 static void forget_analysis(const char *path, struct patina_cloud *cloud, const struct pt_section *shapes)
 {
-    pt_log(PT_LOG_INFO, "%s: saved by an older version. The points are analyzed again, for their trust.", path);
+    pt_log(PT_LOG_WARNING, "%s: saved by an older version. The points are analyzed again, for their trust.", path);
     pt_pages_free(cloud->shapes, shapes->size);
     cloud->shapes = NULL;
     cloud->mapped &= ~(1u << PT_ARRAY_SHAPES);

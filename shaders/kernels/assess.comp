@@ -25,8 +25,8 @@ void main()
     if (!ours && args.first == 0u)
         return;
     uint word = ours ? shapes[pt_place_of(id, at)] : 0u, sigma_class = word >> PT_SHAPE_SIGMA_SHIFT & PT_SHAPE_CLASS_BITS;
-    precise float doubt = ours ? float(15u - (word >> PT_SHAPE_TRUST_SHIFT & 15u)) * PT_TRUST_STEP : 1.0;
-    precise float sure = 1.0 - doubt * doubt;
+    precise float doubt = ours ? float(15u - (word >> PT_SHAPE_TRUST_SHIFT & 15u)) : 15.0;
+    precise float sure = (225.0 - doubt * doubt) * PT_TRUST_STEP;
     precise float sigma = args.instance.spacing[sigma_class] * args.sigma_scale;
     if (args.trust != 0u)
         trust[to] = sure;

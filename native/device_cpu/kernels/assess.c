@@ -24,8 +24,8 @@ static void assess_row(void *context, uint32_t y)
             const vi word = vi_gather(shapes, id, ours);
             const vi class = vi_and(vi_shr(word, PT_SHAPE_SIGMA_SHIFT), vi_set(PT_SHAPE_CLASS_BITS));
             const vi level = vi_and(vi_shr(word, PT_SHAPE_TRUST_SHIFT), vi_set(15u));
-            const vf doubt = vi_convert(vi_sub(vi_set(15u), level)) * vf_set(PT_TRUST_STEP);
-            sure = vf_select(ours, vf_set(1.0f) - doubt * doubt, sure);
+            const vf doubt = vi_convert(vi_sub(vi_set(15u), level));
+            sure = vf_select(ours, (vf_set(225.0f) - doubt * doubt) * vf_set(PT_TRUST_STEP), sure);
             const vm known = vm_and(ours, vm_not(vi_eq(class, vi_set(0))));
             sigma = vf_select(known, vf_look_up(args->instance.spacing, PT_SPACINGS, class) * vf_set(args->sigma_scale), sigma);
         }

@@ -708,9 +708,9 @@ typedef struct patina_frame_stats {
     uint64_t mapped_read;     // by passes over points, each counted; what pixels ask of single points comes to it
     uint32_t mapped_rounds;   // of the pass over points that took most; 0 where nothing is mapped
     uint32_t mapped_returned; // how often all that was held was given back
-    uint64_t
-        points_lost; // of mapped files that cannot be read any more, cut short or on a disk that is gone: they are not drawn. A line
-                     // of the log names each such file once
+    // Points of mapped files that cannot be read any more, cut short or on a disk that is gone: they are not drawn. The log names each
+    // such file once.
+    uint64_t points_lost;
     uint64_t untrusted; // points of the scene that are left out for their trust: patina_cloud_style.least_trust
 } patina_frame_stats;
 
