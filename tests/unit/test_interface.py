@@ -425,7 +425,7 @@ def draw(stage: Stage) -> None:
 
 def finish(stage: Stage, function: str, arguments: list, parameters: list) -> None:
     """What the call gave is used once, and destroyed."""
-    if "task" in function and parameters and parameters[-1][1] == "out" and isinstance(arguments[-1], type(ctypes.byref(ctypes.c_int()))):
+    if parameters and parameters[-1][1] == "out" and "patina_task" in parameters[-1][0] and isinstance(arguments[-1], type(ctypes.byref(ctypes.c_int()))):
         task = arguments[-1]._obj
         if task.value:
             assert stage.call("patina_task_wait", task) in CODES
