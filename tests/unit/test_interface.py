@@ -536,7 +536,7 @@ def try_alone(library: str, function: str, all_of_them: dict) -> tuple[bool, str
                 try_function(stage, function, all_of_them[function], tell)
             os.write(there, b"\0" + str(count).encode())
             status = 0
-        except BaseException as error:  # noqa: BLE001: the process ends with it
+        except BaseException as error:  # noqa: BLE001 - the process ends with it
             os.write(there, b"\0" + f"{last[0]}: {type(error).__name__}: {error}".encode()[:600])
         shutil.rmtree(folder, ignore_errors=True)
         os._exit(status)
