@@ -188,7 +188,11 @@ int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], p
     struct patina_task task = {.work = fingerprint, .fingerprint = values};
     if (!desc || !values)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: desc or values is NULL");
-    const int error = pt_take(NULL, "patina_task_fingerprint", desc, &task.desc, sizeof task.desc);
+    int error = pt_take(NULL, "patina_task_fingerprint", desc, &task.desc, sizeof task.desc);
+    if (!error && task.desc.count >> 48)
+        error = pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS,
+                        "patina_task_fingerprint: %llu points are more than any array holds",
+                        (unsigned long long)task.desc.count);
     return error ? error : start(&task, out);
 }
 

@@ -155,16 +155,18 @@ static uint64_t add_array(uint64_t hash, const patina_array *array, uint64_t cou
     return array->data ? pt_fingerprint(hash, array->data, count * array->components * bytes[array->type]) : hash;
 }
 
+enum { MOST_COMPONENTS = 4 }; // that any array of a descriptor may have
+
 int pt_desc_fingerprint(const patina_cloud_desc *desc, uint64_t values[2])
 {
     const patina_array *arrays[] = {&desc->position, &desc->normal, &desc->opacity, &desc->radius,
                                     &desc->classes,  &desc->color,  &desc->scalar};
     for (int i = 0; i < 7; i++)
-        if (arrays[i]->data && (arrays[i]->type > PATINA_INT32 || arrays[i]->stride))
+        if (arrays[i]->data && (arrays[i]->type > PATINA_INT32 || arrays[i]->stride || arrays[i]->components > MOST_COMPONENTS))
             return pt_fail(NULL, PATINA_ERROR_ARGUMENT,
-                           "patina_task_fingerprint: array %d is not tightly packed, or of an "
-                           "unknown type",
-                           i);
+                           "patina_task_fingerprint: array %d is not tightly packed, of an unknown type, or of more than %d "
+                           "components",
+                           i, MOST_COMPONENTS);
     values[0] = mix(0, desc->count);
     values[1] = mix(1, desc->count);
     for (int i = 0; i < 7; i++)

@@ -425,7 +425,7 @@ def draw(stage: Stage) -> None:
 
 def finish(stage: Stage, function: str, arguments: list, parameters: list) -> None:
     """What the call gave is used once, and destroyed."""
-    if "task" in function and parameters and parameters[-1][1] == "out" and isinstance(arguments[-1], type(ctypes.byref(ctypes.c_int()))):
+    if parameters and parameters[-1][1] == "out" and "patina_task" in parameters[-1][0] and isinstance(arguments[-1], type(ctypes.byref(ctypes.c_int()))):
         task = arguments[-1]._obj
         if task.value:
             assert stage.call("patina_task_wait", task) in CODES
@@ -536,7 +536,7 @@ def try_alone(library: str, function: str, all_of_them: dict) -> tuple[bool, str
                 try_function(stage, function, all_of_them[function], tell)
             os.write(there, b"\0" + str(count).encode())
             status = 0
-        except BaseException as error:  # noqa: BLE001: the process ends with it
+        except BaseException as error:  # noqa: BLE001 - the process ends with it
             os.write(there, b"\0" + f"{last[0]}: {type(error).__name__}: {error}".encode()[:600])
         shutil.rmtree(folder, ignore_errors=True)
         os._exit(status)

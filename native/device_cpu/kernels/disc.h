@@ -202,7 +202,7 @@ static inline void pt_disc_axes(const struct disc_args *args, const struct pt_di
 static inline void pt_disc_shape(const struct view_args *view, const struct disc_args *args, vi word, struct pt_discs *d)
 {
     const vf zero = vf_zero(), one = vf_set(1.0f), xs = vf_set(view->ray_xs), ys = vf_set(view->ray_ys);
-    vf u = zero, v = zero, n[3] = {zero, zero, one}, object[3];
+    vf u = zero, v = zero, n[3] = {zero, zero, one}, object[3] = {zero, zero, one};
     vm none = vm_first(PT_LANES);
     if (view->perspective) {
         u = vf_set(view->ray_x0) + xs * d->x;
