@@ -52,8 +52,8 @@ double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *pla
 int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_plane *plane, double thinning,
                                struct pt_neighbourhood *out);
 
-// Bounds the footprint of a point by how far its neighbours lie from each other: strays, leaves, bars of a railing and wires lie
-// farther from others than these do.
+// Bounds the footprint of a point by how far its neighbours lie from each other. If gaps divide the neighbours and the point's own part
+// is thin or small (a bar, a leaf), that part alone describes the point. Rows of a scan on a surface stay whole.
 void pt_neighbourhood_bound(const struct pt_sample *sample, struct pt_neighbourhood *hood);
 // The axes of the ellipse that has a and b for conjugate half diameters; the greater's direction in `axis`.
 void pt_ellipse_of(const double a[3], const double b[3], double axis[3], double *major, double *minor);

@@ -286,6 +286,62 @@ static void test_kinds(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// A railing beside a floor: each bar is a part. Its footprints follow it and end far from the next bar. Rows of a scan on the floor,
+// as far apart as the bars, stay closed.
+static void test_parts(void **state)
+{
+    (void)state;
+    enum {
+        FLOOR = 20000,
+        BARS = 30,
+        LENGTH = 60,
+        RAILING = BARS * LENGTH,
+        ROWS = 20,
+        COLUMNS = 100,
+        COUNT = FLOOR + RAILING + ROWS * COLUMNS
+    };
+    static double p[COUNT][3];
+    struct pcg random = pcg_seed(5);
+    uint32_t n = 0;
+    for (; n < FLOOR; n++) {
+        p[n][0] = 140.0 * pcg_unit(&random);
+        p[n][1] = 140.0 * pcg_unit(&random);
+    }
+    for (int bar = 0; bar < BARS; bar++)
+        for (int i = 0; i < LENGTH; i++, n++) {
+            p[n][0] = 6.0 * bar + 0.8 * (pcg_unit(&random) - 0.5);
+            p[n][1] = 200.0;
+            p[n][2] = i + 0.2 * pcg_unit(&random);
+        }
+    for (int y = 0; y < ROWS; y++)
+        for (int x = 0; x < COLUMNS; x++, n++) {
+            p[n][0] = 300.0 + x + 0.05 * pcg_unit(&random);
+            p[n][1] = 6.0 * y + 0.05 * pcg_unit(&random);
+        }
+    patina_cloud *cloud = build_doubles(&p[0][0], COUNT);
+    analyse(cloud, 0);
+    struct read r = read_cloud(cloud);
+    uint32_t follows = 0, narrow = 0, inner = 0, whole = 0;
+    for (uint32_t i = FLOOR; i < FLOOR + RAILING; i++) {
+        follows += r.kind[i] == PATINA_KIND_LINE && fabsf(r.axis[3 * i + 2]) > 0.9f && r.half_axes[2 * i] > 0.7f;
+        narrow += r.half_axes[2 * i + 1] > 0.2f && r.half_axes[2 * i + 1] < 0.8f;
+    }
+    for (uint32_t i = FLOOR + RAILING; i < COUNT; i++) {
+        const uint32_t row = (i - FLOOR - RAILING) / COLUMNS, column = (i - FLOOR - RAILING) % COLUMNS;
+        if (row < 2 || row >= ROWS - 2 || column < 10 || column >= COLUMNS - 10)
+            continue;
+        inner++;
+        whole += r.kind[i] == PATINA_KIND_SURFACE && r.half_axes[2 * i + 1] > 0.8f;
+    }
+    printf("  bars: %u of %d follow the bar, %u are narrow; rows on a floor: %u of %u stay a surface\n", follows, RAILING,
+           narrow, whole, inner);
+    assert_true(follows > RAILING * 80 / 100);
+    assert_true(narrow > RAILING * 90 / 100);
+    assert_true(whole > inner * 95 / 100);
+    read_free(&r);
+    patina_cloud_destroy(cloud);
+}
+
 // 1 mm of detail at 5e6 m: the same words as at the origin.
 static void test_far_away(void **state)
 {
@@ -577,7 +633,7 @@ int main(void)
         cmocka_unit_test(test_sigma),      cmocka_unit_test(test_far_away),       cmocka_unit_test(test_hard),
         cmocka_unit_test(test_words),      cmocka_unit_test(test_threads),        cmocka_unit_test(test_orientation),
         cmocka_unit_test(test_votes),      cmocka_unit_test(test_saved_and_task), cmocka_unit_test(test_cancel_and_refusals),
-        cmocka_unit_test(test_soft),
+        cmocka_unit_test(test_soft),       cmocka_unit_test(test_parts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

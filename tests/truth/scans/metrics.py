@@ -16,6 +16,7 @@ MEANING = {  # name → what it says; the order of tables
     "psnr": "dB, sRGB, scanned pixels (more is better)",
     "ssim": "structural similarity of grey, scanned pixels (1 is best)",
     "thin": "of scanned pixels of bars, wires and leaves: drawn where they are (1 is best)",
+    "width": "pixels drawn at the depth of a bar, wire or leaf, over those of them where it is: 1 is best, 2 is twice as wide",
     "outline": "pixels from the truth's edges in depth to the picture's, mean, at most 20",
     "invented": "of pixels whose surface was not scanned: drawn",
     "hiding": "of them, nearer than the truth by more than 5 cm and 1 % of z",
@@ -80,7 +81,20 @@ def classes(exact: Exact, depth: np.ndarray) -> dict[str, np.ndarray]:
     solid = np.isfinite(exact.middle)
     return {"false": exact.scanned & nearer, "lost": exact.scanned & farther, "sky": exact.sky & drawn,
             "invented": solid & ~exact.scanned & drawn, "hiding": solid & ~exact.scanned & nearer,
-            "thin lost": exact.scanned & exact.thin & (nearer | farther)}
+            "thin lost": exact.scanned & exact.thin & (nearer | farther), "nearer": nearer, "farther": farther}
+
+
+def thin_width(exact: Exact, depth: np.ndarray, wrong: dict[str, np.ndarray]) -> float:
+    """Drawn area of thin parts over the area of those that are drawn where they are. A pixel that is false, or sky, belongs to
+    the nearest thin part within FAR pixels if it has its depth, within twice what counts as wrong."""
+    right = exact.thin & np.isfinite(depth) & ~wrong["nearer"] & ~wrong["farther"]
+    if right.mean() < 0.001:
+        return float("nan")
+    away, (row, column) = distance_transform_edt(~exact.thin, return_indices=True)
+    beside = np.isfinite(depth) & ~exact.thin & (away <= FAR) & (wrong["nearer"] | wrong["sky"])
+    z, own = depth[beside], exact.near[row[beside], column[beside]]
+    swollen = np.abs(z - own) <= 2.0 * np.maximum(NEAR, SHARE * own)
+    return float((right.sum() + swollen.sum()) / right.sum())
 
 
 def measure(exact: Exact, color: np.ndarray, depth: np.ndarray) -> dict[str, float]:
@@ -97,6 +111,7 @@ def measure(exact: Exact, color: np.ndarray, depth: np.ndarray) -> dict[str, flo
             "psnr": psnr(ours, theirs, exact.scanned),
             "ssim": ssim(ours @ grey, theirs @ grey, exact.scanned),
             "thin": 1.0 - _share(wrong["thin lost"], thin) if thin.mean() > 0.001 else float("nan"),
+            "width": thin_width(exact, depth, wrong),
             "outline": float(away[wanted].mean()) if wanted.any() else float("nan"),
             "invented": _share(wrong["invented"], solid & ~exact.scanned),
             "hiding": _share(wrong["hiding"], solid & ~exact.scanned),

@@ -34,7 +34,7 @@ from truth.scans.exact import Exact, Stage, camera  # noqa: E402
 from truth.scans.scenes import HEIGHT, SKY, STEP, WIDTH, Scene  # noqa: E402
 from truth.scans.solids import linear  # noqa: E402
 
-COLUMNS = ("false", "lost", "sky", "psnr", "ceiling", "ssim", "thin", "outline", "flicker", "invented", "hiding", "ms", "work")
+COLUMNS = ("false", "lost", "sky", "psnr", "ceiling", "ssim", "thin", "width", "outline", "flicker", "invented", "hiding", "ms", "work")
 PERCENT = ("false", "lost", "sky", "thin", "invented", "hiding")
 TITLES = [f"{c} %" if c in PERCENT else {"psnr": "PSNR", "ssim": "SSIM", "outline": "outline px"}.get(c, c) for c in COLUMNS]
 PAINT = {"false": (1.0, 0.1, 0.1), "lost": (0.1, 0.2, 1.0), "sky": (1.0, 0.0, 1.0), "hiding": (1.0, 0.6, 0.0)}
@@ -138,7 +138,7 @@ def cells(values: dict[str, float]) -> list[str]:
     found = []
     for column in COLUMNS:
         value = values[column] * (100.0 if column in PERCENT else 1.0)
-        digits = {"ssim": 3, "ms": 1, "work": 1, "outline": 2}.get(column, 1)
+        digits = {"ssim": 3, "ms": 1, "work": 1, "outline": 2, "width": 2}.get(column, 1)
         found.append("–" if not np.isfinite(value) else f"{value:.{digits}f}")
     return found
 

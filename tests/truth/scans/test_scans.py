@@ -241,6 +241,24 @@ class Seen(unittest.TestCase):
         self.assertAlmostEqual(metrics.measure(truth, darker, depth)["psnr"], -10.0 * np.log10(square), places=4)
         self.assertEqual(metrics.flicker((truth, truth), (color, color)), 0.0)
 
+    def test_width_of_thin_parts(self) -> None:
+        """A bar of 10 pixels before a wall and the sky: drawn 4 pixels wider on each side, then with something else beside it."""
+        truth = np.full((100, 100), 10.0, np.float32)
+        truth[80:] = np.inf
+        truth[:, 40:50] = 5.0
+        thin = truth == 5.0
+        black = np.zeros((100, 100, 3), np.float32)
+        one = exact.Exact(truth, truth, truth, black, np.zeros((100, 100)), np.isinf(truth), thin, np.isfinite(truth),
+                          black.astype(np.uint8))
+        self.assertEqual(metrics.measure(one, black, truth)["width"], 1.0)
+        wide = truth.copy()
+        wide[:, 36:54] = 5.0
+        self.assertAlmostEqual(metrics.measure(one, black, wide)["width"], 1.8)
+        wide[:, 36:40] = 7.0  # not at the bar's depth
+        wide[:50, 40:50] = 10.0  # lost: half of the bar, and what is drawn beside it stays
+        self.assertAlmostEqual(metrics.measure(one, black, wide)["width"], (500 + 400) / 500)
+        self.assertTrue(np.isnan(metrics.measure(one, black, np.full_like(truth, np.inf))["width"]))
+
     def test_outline(self) -> None:
         """A square that is drawn three pixels wider."""
         truth, drawn = np.full((100, 100), 10.0, np.float32), np.full((100, 100), 10.0, np.float32)
