@@ -20,7 +20,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Files of version 12 do not count levels of trust, which their analysis does not have. Files of version 11 are neither packed nor without order, those of 10 have no sums of pages either.
+// Files of version 12 have no trust. Files of version 11 are also neither packed nor without order, and files of version 10 also have no
+// sums of pages.
 enum {
     SECTION = 1 << 16,
     VERSION = 13,
