@@ -160,7 +160,8 @@ static struct picture beside(patina_device *device, uint64_t strays)
     }
     patina_cloud *cloud = points_upload(&points);
     CHECK(patina_cloud_analyse(cloud, NULL, NULL), cloud);
-    const patina_cloud_style style = {.struct_size = sizeof style, .least_trust = -1.0f}; // by default strays are not drawn at all
+    const patina_cloud_style style = {.struct_size = sizeof style,
+                                      .least_trust = -1.0f}; // by default strays are not drawn at all
     patina_scene *scene = scene_of(cloud, &style);
     patina_camera camera = camera_perspective(eye, target, 45.8, ACROSS, ACROSS, 0.1, 1000.0);
     patina_settings settings = settings_default(ACROSS, ACROSS);
