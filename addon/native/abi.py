@@ -89,7 +89,7 @@ class CloudInfo(Descriptor):
                 ("has_classes", c_uint32), ("scalar_range", c_float * 2), ("class_bits", c_uint32 * 8),
                 ("has_shapes", c_uint32), ("normals_oriented", c_uint32), ("estimated_normals", c_uint64),
                 ("kinds", c_uint64 * 6), ("seen_through", c_uint64), ("packed", c_uint32), ("numbered", c_uint32),
-                ("packed_error", c_double), ("trusts", c_uint64 * 16)]
+                ("packed_error", c_double), ("trusts", c_uint64 * 16), ("trust_default", c_double)]
 
 
 class AnalysisDesc(Descriptor):

@@ -287,7 +287,7 @@ class PatinaObjectProperties(PropertyGroup):
     least_trust: FloatProperty(
         name="Trust", override=_OVERRIDE, default=0.64, min=0.0, max=1.0, subtype='FACTOR',
         description="Points of less trust are not drawn and cast no shadow. Trust is the probability that a point lies on a surface, "
-                    "and is no mixed pixel or stray. At zero, all points are drawn")
+                    "and is no mixed pixel or stray. At its default Patina raises it for each cloud, up to 0.84. At zero, all points are drawn")
     opacity: FloatProperty(
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
         description="How much the surface hides of what lies behind it")

@@ -57,12 +57,13 @@ uint32_t pt_trusted_from(const struct pt_instance *instance)
     static const double slack = 1e-4; // the levels in float32 are what they are
     const patina_cloud_style *style = &instance->style;
     const patina_cloud_info *info = &instance->cloud->info;
-    double least = (double)(style->least_trust == 0.0f ? PATINA_TRUST_DEFAULT : style->least_trust);
+    const double usual = pt_trust_of_level(pt_default_level(info->trusts));
+    double least = style->least_trust == 0.0f ? usual : (double)style->least_trust;
     uint32_t level = 0;
     if (!info->has_shapes)
         return 0;
     if (style->hidden_kinds >> PATINA_KIND_STRAY & 1u)
-        least = fmax(least, (double)PATINA_TRUST_DEFAULT);
+        least = fmax(least, usual);
     while (level < PT_TRUST_LEVELS - 1 && pt_trust_of_level(level) < least - slack)
         level++;
     const uint64_t untrusted = below(info, level);

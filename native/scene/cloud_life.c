@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How a cloud's handle begins and ends, and what it tells.
 #include "cloud.h"
+#include "analysis.h"
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "page_sums.h"
@@ -47,5 +48,7 @@ int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info)
 {
     if (!cloud)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_get_info: cloud is NULL");
-    return pt_give(&cloud->handle, "patina_cloud_get_info", &cloud->info, sizeof cloud->info, info);
+    patina_cloud_info own = cloud->info;
+    own.trust_default = own.has_shapes ? pt_trust_of_level(pt_default_level(own.trusts)) : 0.0;
+    return pt_give(&cloud->handle, "patina_cloud_get_info", &own, sizeof own, info);
 }

@@ -39,6 +39,23 @@ uint32_t pt_level_of_trust(double trust)
     return PT_TRUST_LEVELS - 1 - (uint32_t)((PT_TRUST_LEVELS - 1) * sqrt(1.0 - fmin(fmax(trust, 0.0), 1.0)) + 0.5);
 }
 
+uint32_t pt_default_level(const uint64_t counts[PT_TRUST_LEVELS])
+{
+    const uint32_t most = pt_level_of_trust((double)PATINA_TRUST_MOST);
+    uint32_t level = pt_level_of_trust((double)PATINA_TRUST_DEFAULT);
+    double right = 0.0, lost = 0.0;
+    for (uint32_t l = 0; l < PT_TRUST_LEVELS; l++) {
+        right += (double)counts[l] * pt_trust_of_level(l);
+        lost += l < level ? (double)counts[l] * pt_trust_of_level(l) : 0.0;
+    }
+    for (; level < most; level++) {
+        lost += (double)counts[level] * pt_trust_of_level(level);
+        if (lost > 0.01 * right)
+            break;
+    }
+    return level;
+}
+
 uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base)
 {
     uint32_t word = class_of(hood->major, base) | class_of(hood->sigma, base / 16.0) << PT_SHAPE_SIGMA_SHIFT;

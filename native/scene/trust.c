@@ -316,7 +316,7 @@ void pt_trust_judge(struct pt_trust *trust, struct pt_pool *pool)
 static int is_untrusted(const struct pt_trust *trust, uint32_t slot)
 {
     const uint32_t level = word_at(trust, slot) >> PT_SHAPE_TRUST_SHIFT & 15u;
-    return level < pt_level_of_trust((double)PATINA_TRUST_DEFAULT);
+    return level < trust->least;
 }
 
 static void move_place(struct pt_neighbours *tree, uint32_t place, const float at[3])
@@ -326,16 +326,20 @@ static void move_place(struct pt_neighbours *tree, uint32_t place, const float a
         xyz[k * PT_LEAF] = at[k];
 }
 
-static uint64_t count_hidden(const struct pt_trust *trust)
+// Finds the least level of trusted points, and returns how many points are below it.
+static uint64_t count_hidden(struct pt_trust *trust)
 {
-    uint64_t count = 0;
+    uint64_t counts[PT_TRUST_LEVELS] = {0}, below = 0;
     for (uint32_t c = 0; c < trust->cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &trust->cloud->chunks[c];
         for (uint32_t i = 0; i < chunk->count; i++)
-            count += is_untrusted(trust, chunk->first + i);
+            counts[word_at(trust, chunk->first + i) >> PT_SHAPE_TRUST_SHIFT & 15u]++;
         pt_store_look(trust->tree->store);
     }
-    return count;
+    trust->least = pt_default_level(counts);
+    for (uint32_t level = 0; level < trust->least; level++)
+        below += counts[level];
+    return below;
 }
 
 static int compare_slots(const void *a, const void *b)

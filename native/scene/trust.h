@@ -19,6 +19,7 @@ struct pt_trust {
     _Atomic uint32_t *shapes;      // slots; the judgement writes PT_SHAPE_TRUST_BITS alone
     uint8_t *reach, *used;         // a place: distance to the 16th neighbor; to the farthest that described the point
     double base;                   // unit of spacings
+    uint32_t least;                // level that trusted points have at least: pt_trust_hide finds it
     patina_progress *progress;
     struct pt_hidden *hidden; // untrusted points that are out of the trees, by chunk
     uint32_t *hidden_first;   // a chunk, and one past the last

@@ -8,7 +8,8 @@
 
 struct columns {
     uint64_t count;
-    int trusted; // untrusted points are left out of the file
+    int trusted;  // untrusted points are left out of the file
+    double least; // trust of those that are not
     float *position, *normal, *spacing, *half_axes, *sigma, *trust;
     uint8_t *kind, *seen_through;
 };
@@ -40,7 +41,7 @@ static void release(struct columns *c)
     free(c->seen_through);
 }
 
-static int is_left_out(const struct columns *c, uint64_t i) { return c->trusted && c->trust[i] < PATINA_TRUST_DEFAULT; }
+static int is_left_out(const struct columns *c, uint64_t i) { return c->trusted && (double)c->trust[i] < c->least - 1e-4; }
 
 static uint64_t count_written(const struct columns *c)
 {
@@ -133,6 +134,7 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, int gri
     tool_free_stations(&stations);
     if (!code)
         code = patina_cloud_get_info(cloud, &built);
+    columns->least = built.trust_default;
     const patina_neighbourhoods wanted = {.struct_size = sizeof wanted,
                                           .normal = columns->normal,
                                           .spacing = columns->spacing,
@@ -155,7 +157,7 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, int gri
             printf("%-12s %llu\n", tool_kinds[i], (unsigned long long)built.kinds[i]);
         uint64_t untrusted = 0;
         for (uint64_t i = 0; i < columns->count; i++)
-            untrusted += columns->kind[i] && columns->trust[i] < PATINA_TRUST_DEFAULT;
+            untrusted += columns->kind[i] && (double)columns->trust[i] < columns->least - 1e-4;
         printf("%-12s %llu\n", "untrusted", (unsigned long long)untrusted);
         if (desc.free_space)
             printf("seen_through %llu\n", (unsigned long long)built.seen_through);

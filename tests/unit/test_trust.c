@@ -148,6 +148,26 @@ static void test_degenerate(void **state)
     free(p);
 }
 
+// Trust is 1 of most points here. Level 6 is PATINA_TRUST_DEFAULT, 9 is PATINA_TRUST_MOST.
+static void test_default_level(void **state)
+{
+    (void)state;
+    uint64_t counts[PT_TRUST_LEVELS] = {[15] = 100000};
+    assert_int_equal(pt_level_of_trust((double)PATINA_TRUST_DEFAULT), 6);
+    assert_int_equal(pt_level_of_trust((double)PATINA_TRUST_MOST), 9);
+    assert_int_equal(pt_default_level(counts), 9);
+    counts[7] = 1300; // 0.72 of these are right: 0.9 % of all that are
+    assert_int_equal(pt_default_level(counts), 9);
+    counts[7] = 1500; // 1.1 %
+    assert_int_equal(pt_default_level(counts), 7);
+    counts[6] = 1600; // 0.64 of these, 1.0 %
+    assert_int_equal(pt_default_level(counts), 6);
+    counts[2] = 50000; // below the least threshold in any case
+    assert_int_equal(pt_default_level(counts), 6);
+    memset(counts, 0, sizeof counts);
+    assert_int_equal(pt_default_level(counts), 9);
+}
+
 static void test_strays_vanish(void **state)
 {
     (void)state;
@@ -156,10 +176,13 @@ static void test_strays_vanish(void **state)
     const patina_analysis_desc desc = {.struct_size = sizeof desc};
     float *trust = trusts_of(with, &desc), *clean = trusts_of(without, &desc), above[64 * 64], beneath[64 * 64];
     uint64_t lost = 0, found = 0, wrong = 0, untrusted = 0;
+    patina_cloud_info info = {.struct_size = sizeof info};
+    CHECK(patina_cloud_get_info(with, &info), with);
+    assert_true(info.trust_default > (double)PATINA_TRUST_DEFAULT - 1e-6);
     for (int i = 0; i < PLANE; i++)
-        lost += trust[i] < PATINA_TRUST_DEFAULT;
+        lost += (double)trust[i] < info.trust_default - 1e-4;
     for (int i = PLANE; i < PLANE + STRAYS; i++)
-        found += trust[i] < PATINA_TRUST_DEFAULT;
+        found += (double)trust[i] < info.trust_default - 1e-4;
     if (10 * found < 9 * STRAYS || 1000 * lost > PLANE)
         fail_msg("%llu of %d strays are found, and %llu of %d others", (unsigned long long)found, STRAYS,
                  (unsigned long long)lost, PLANE);
@@ -227,10 +250,8 @@ static void test_threads(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_levels),
-        cmocka_unit_test(test_degenerate),
-        cmocka_unit_test(test_strays_vanish),
-        cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_levels),        cmocka_unit_test(test_degenerate), cmocka_unit_test(test_default_level),
+        cmocka_unit_test(test_strays_vanish), cmocka_unit_test(test_threads),
     };
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -211,6 +211,7 @@ typedef struct patina_cloud_info {
     uint32_t numbered;          // 1: points are numbered as the file has them: patina_save_desc.drop_order
     double packed_error;        // how far packing moved a position at most, object units
     uint64_t trusts[16];        // drawn points of each level of trust, where analysed: level l stands for 1 - ((15 - l) / 15)^2
+    double trust_default;       // least trust of points that are drawn by default: PATINA_TRUST_DEFAULT
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -244,8 +245,10 @@ enum patina_kind {
 
 // Numbers of patina_analysis_desc.trust_features: scene/trust_features.h lists them.
 #define PATINA_TRUST_FEATURES 33
-// The least trust of points that are drawn by default: at most 1 % of the right samples of any scene for tuning have less.
+// By default points of less trust are not drawn: at most 1 % of the right samples of any scene for tuning have less. Of each cloud the
+// default is raised, to PATINA_TRUST_MOST at most, while no more than 1 % of its points that are probably right have less.
 #define PATINA_TRUST_DEFAULT 0.64f
+#define PATINA_TRUST_MOST 0.84f
 
 typedef struct patina_analysis_desc {
     size_t struct_size;
@@ -395,9 +398,9 @@ typedef struct patina_cloud_style {
     // Of clouds that were analysed; nothing for others:
     uint32_t free_space;   // patina_free_space: what becomes of what a station saw through
     uint32_t hidden_kinds; // bits 1 << patina_kind: points that are not drawn and cast no shadow
-    float least_trust; // points of less trust are not drawn and cast no shadow; 0 = PATINA_TRUST_DEFAULT, negative = all are
-                       // drawn. Where no point has as much, all are drawn, too, and the log says so
-    float largest_gap; // world units; no disc is wider, whatever its radius; 0 = as wide as it is
+    float least_trust;     // points of less trust are not drawn and cast no shadow; 0 = the cloud's own default, negative = all
+                           // are drawn. Where no point has as much, all are drawn, too, and the log says so
+    float largest_gap;     // world units; no disc is wider, whatever its radius; 0 = as wide as it is
     const patina_mask
         *mask; // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
                // the scene or the next patina_scene_clear, as the cloud must; the grade too
