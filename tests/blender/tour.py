@@ -68,8 +68,8 @@ def border(scene, on):
 
 
 def render(name):
-    bpy.ops.render.render()
-    bpy.data.images['Render Result'].save_render(os.path.join(os.environ["PATINA_SCREENSHOTS"], f"{name}.png"))
+    bpy.context.scene.render.filepath = os.path.join(os.environ["PATINA_SCREENSHOTS"], name)  # two files of two eyes
+    bpy.ops.render.render(write_still=True)
 
 
 def invert(scene):
