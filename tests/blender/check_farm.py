@@ -27,8 +27,17 @@ def pixels_of(path):
     return flat
 
 
-def scene_of_points():
+def clean_scene():
+    """Without the materials and images of other tests: a job names their files."""
     scene = new_scene()
+    for collection in (bpy.data.materials, bpy.data.images):
+        for item in list(collection):
+            collection.remove(item)
+    return scene
+
+
+def scene_of_points():
+    scene = clean_scene()
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 61, 47, 100
     scene.render.image_settings.file_format, scene.render.image_settings.color_mode = 'PNG', 'RGBA'
     scene.render.dither_intensity = 0.0  # grain is of the whole picture
@@ -167,7 +176,7 @@ def test_farm_shares_built_clouds():
     """A machine whose own folder holds nothing finds what is kept beside the scan, and reads the scan no more."""
     folder = SCRATCH / "shared"
     folder.mkdir()
-    new_scene()
+    clean_scene()
     obj, = import_ply(dense("shared/scan.ply"), link=True)
     whole = render()["Combined"].copy()
     own = linked.source_of(obj, 1, []).kept
