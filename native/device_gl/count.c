@@ -76,31 +76,34 @@ void pt_gl_count_begin(struct pt_gl_device *d)
 #undef VALUE
 }
 
-// Reads the commands that were kept, and keeps the next ones if the environment asks for it.
-static int count_empty(struct pt_gl_device *d)
+int pt_gl_counts_empty(void) { return getenv("PATINA_GL_COUNT_EMPTY") != NULL; }
+
+static void read_commands(struct pt_gl_counter *c)
 {
-    struct pt_gl_counter *c = &d->counter;
     const GladGLContext *gl = &c->driver;
-    if (c->commands) {
-        uint32_t commands[MOST_COMMANDS][COMMAND / 4];
-        gl->BindBuffer(GL_ATOMIC_COUNTER_BUFFER, c->commands);
-        gl->GetBufferSubData(GL_ATOMIC_COUNTER_BUFFER, 0, (GLsizeiptr)COMMAND * c->command_count, commands);
-        gl->DeleteBuffers(1, &c->commands);
-        for (uint32_t i = 0; i < c->command_count; i++)
-            c->counts.empty += !commands[i][0] || !commands[i][1] || !commands[i][2];
-        c->commands = c->command_count = 0;
-    }
-    if (getenv("PATINA_GL_COUNT_EMPTY")) {
-        gl->GenBuffers(1, &c->commands);
-        gl->BindBuffer(GL_ATOMIC_COUNTER_BUFFER, c->commands);
-        gl->BufferData(GL_ATOMIC_COUNTER_BUFFER, (GLsizeiptr)COMMAND * MOST_COMMANDS, NULL, GL_STREAM_READ);
-    }
-    return pt_gl_check(d, "counting calls");
+    uint32_t commands[MOST_COMMANDS][COMMAND / 4];
+    gl->BindBuffer(GL_ATOMIC_COUNTER_BUFFER, c->commands);
+    gl->GetBufferSubData(GL_ATOMIC_COUNTER_BUFFER, 0, (GLsizeiptr)COMMAND * c->command_count, commands);
+    gl->DeleteBuffers(1, &c->commands);
+    for (uint32_t i = 0; i < c->command_count; i++)
+        c->counts.empty += !commands[i][0] || !commands[i][1] || !commands[i][2];
+    c->commands = c->command_count = 0;
+}
+
+static void keep_commands(struct pt_gl_counter *c)
+{
+    const GladGLContext *gl = &c->driver;
+    gl->GenBuffers(1, &c->commands);
+    gl->BindBuffer(GL_ATOMIC_COUNTER_BUFFER, c->commands);
+    gl->BufferData(GL_ATOMIC_COUNTER_BUFFER, (GLsizeiptr)COMMAND * MOST_COMMANDS, NULL, GL_STREAM_READ);
 }
 
 int pt_gl_counts(struct pt_gl_device *d, void *counts)
 {
-    const int error = count_empty(d);
+    if (d->counter.commands)
+        read_commands(&d->counter);
+    if (pt_gl_counts_empty())
+        keep_commands(&d->counter);
     *(struct pt_counts *)counts = d->counter.counts;
-    return error;
+    return pt_gl_check(d, "counting calls");
 }

@@ -90,6 +90,8 @@ static void thread_main(void *argument)
         memcpy(c->message, d->message, sizeof c->message);
 
         pt_mutex_lock(&d->lock);
+        d->counts = d->counter.counts;
+        d->keeps_commands = d->counter.commands != 0;
         c->done = 1;
         d->call = NULL;
         pt_condition_wake_all(&d->changed);
@@ -496,7 +498,16 @@ static void op_watch(struct patina_device *device, void (*look)(void *context), 
 
 static int op_wait(struct patina_device *device) { return call(device, wait_for_work, NULL); }
 
-static int op_counts(struct patina_device *device, struct pt_counts *out) { return call(device, pt_gl_counts, out); }
+// Twice a frame: the GL thread is asked for empty dispatches alone.
+static int op_counts(struct patina_device *device, struct pt_counts *out)
+{
+    struct pt_gl_device *d = (struct pt_gl_device *)device;
+    pt_mutex_lock(&d->lock);
+    const int ask = d->keeps_commands || pt_gl_counts_empty();
+    *out = d->counts;
+    pt_mutex_unlock(&d->lock);
+    return ask ? call(device, pt_gl_counts, out) : PATINA_OK;
+}
 
 static void op_destroy(struct patina_device *device)
 {

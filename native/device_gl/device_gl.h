@@ -77,6 +77,8 @@ struct pt_gl_device {
     struct pt_mutex lock;
     struct pt_condition changed;
     struct pt_gl_call *call;
+    struct pt_counts counts; // after the last call
+    int keeps_commands;
 
     // Of the GL thread alone.
     GladGLContext gl; // counts calls: count.c
@@ -125,8 +127,10 @@ int pt_gl_check(struct pt_gl_device *d, const char *doing);
 // count.c
 // Replaces the functions of d->gl by counting ones. In the GL thread, once the functions are loaded.
 void pt_gl_count_begin(struct pt_gl_device *d);
-// counts (out, struct pt_counts): since the device was made. Empty indirect dispatches count between two calls of it, if the environment
-// variable PATINA_GL_COUNT_EMPTY was set at the first: that takes a small copy for each dispatch, which does not count itself.
+// Whether the environment variable PATINA_GL_COUNT_EMPTY asks for empty indirect dispatches.
+int pt_gl_counts_empty(void);
+// counts (out, struct pt_counts): since the device was made. Empty indirect dispatches count between two calls of it, if they were asked
+// for at the first: that takes a small copy for each dispatch, which does not count itself.
 int pt_gl_counts(struct pt_gl_device *d, void *counts);
 
 struct pt_gl_unit {
