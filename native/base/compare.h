@@ -3,6 +3,8 @@
 #ifndef PT_COMPARE_H
 #define PT_COMPARE_H
 
+#include <stdint.h>
+
 static inline int pt_compare_floats(const void *a, const void *b)
 {
     const float x = *(const float *)a, y = *(const float *)b;
@@ -12,6 +14,12 @@ static inline int pt_compare_floats(const void *a, const void *b)
 static inline int pt_compare_doubles(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static inline int pt_compare_u64(const void *a, const void *b)
+{
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
     return (x > y) - (x < y);
 }
 

@@ -8,8 +8,10 @@
 // grows where sigma is large beside the way from cell to cell, until the slope is known to LOOSE.
 #include "grid.h"
 
+#include "base/compare.h"
 #include "base/descriptor.h"
 #include "base/progress.h"
+#include "base/vector.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -34,13 +36,11 @@ static void place_of(const struct pt_grid *g, uint32_t point, double p[3])
         p[k] = (double)g->position[3 * (size_t)point + (size_t)k];
 }
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 void pt_grid_towards(const struct pt_grid *g, const double p[3], double d[3])
 {
     for (int k = 0; k < 3; k++)
         d[k] = g->station[k] - (g->scan->parallel ? 0 : p[k]);
-    double length = sqrt(dot(d, d));
+    double length = sqrt(pt_dot(d, d));
     for (int k = 0; k < 3; k++)
         d[k] /= length;
 }
@@ -49,28 +49,22 @@ void pt_grid_towards(const struct pt_grid *g, const double p[3], double d[3])
 static double depth_and_way(const double a[3], const double b[3], const double d[3], double *way)
 {
     const double v[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    double depth = dot(v, d);
-    *way = sqrt(fmax(dot(v, v) - depth * depth, 0));
+    double depth = pt_dot(v, d);
+    *way = sqrt(fmax(pt_dot(v, v) - depth * depth, 0));
     return fabs(depth);
 }
 
 // ---- the noise of a scan -------------------------------------------------------------------------------------------
-
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 static double depth_of(const struct pt_grid *g, uint32_t point)
 {
     double p[3], d[3];
     place_of(g, point, p);
     if (g->scan->parallel)
-        return dot(p, g->station);
+        return pt_dot(p, g->station);
     for (int k = 0; k < 3; k++)
         d[k] = p[k] - g->station[k];
-    return sqrt(dot(d, d));
+    return sqrt(pt_dot(d, d));
 }
 
 int pt_grid_measure_noise(struct pt_grid *g)
@@ -88,7 +82,7 @@ int pt_grid_measure_noise(struct pt_grid *g)
         if (isfinite(bend))
             samples[count++] = fabs(bend);
     }
-    qsort(samples, count, sizeof *samples, compare);
+    qsort(samples, count, sizeof *samples, pt_compare_doubles);
     g->sigma = count ? samples[count / 2] / (0.6745 * sqrt(6)) : 0;
     free(samples);
     return PATINA_OK;
@@ -179,7 +173,7 @@ void pt_grid_normal(const struct pt_grid *g, int64_t column, int64_t row, float 
     if (!fit(&w, reach, a, b))
         return;
     double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    double length = sqrt(dot(n, n)) * (dot(n, d) < 0 ? -1 : 1);
+    double length = sqrt(pt_dot(n, n)) * (pt_dot(n, d) < 0 ? -1 : 1);
     for (int k = 0; k < 3; k++)
         normal[k] = length != 0 && isfinite(length) ? (float)(n[k] / length) : 0;
 }

@@ -2,6 +2,7 @@
 // What lists of points mean: faces, which give normals to a PLY file that has no others, and the cells of a scanner's grid.
 #include "ply.h"
 #include "base/elementary.h"
+#include "base/vector.h"
 
 #include <math.h>
 #include <string.h>
@@ -31,12 +32,10 @@ static void cross(double c[3], const double a[3], const double b[3])
     c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 // Divides by the length. False for what has none.
 static bool make_unit(double v[3])
 {
-    double length = sqrt(dot(v, v));
+    double length = sqrt(pt_dot(v, v));
     for (int k = 0; k < 3; k++)
         v[k] /= length;
     return length > 0 && isfinite(length);
@@ -65,7 +64,7 @@ static void add_polygon(struct ply_faces *faces, const double *corners, size_t c
         subtract(a, corner(faces, corners, i ? i - 1 : count - 1), corner(faces, corners, i));
         subtract(b, corner(faces, corners, i + 1 < count ? i + 1 : 0), corner(faces, corners, i));
         cross(c, a, b);
-        double angle = flip * pt_atan2(sqrt(dot(c, c)), dot(a, b));
+        double angle = flip * pt_atan2(sqrt(pt_dot(c, c)), pt_dot(a, b));
         float *sum = faces->normal + 3 * (size_t)corners[i];
         for (int k = 0; k < 3; k++)
             sum[k] += (float)(angle * normal[k]);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Positions finer than float32: the origin that keeps them, and the box.
 #include "file.h"
+#include "base/compare.h"
 
 #include <float.h>
 #include <math.h>
@@ -14,12 +15,6 @@ enum { SAMPLES = PT_ORIGIN_SAMPLES };
 static const double allowed_loss = 1e-7;
 // Beyond this an origin in whole units is itself not exact.
 static const double largest_origin = 1e15;
-
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 // Up to SAMPLES finite positions, evenly spread over the file, one array an axis, each sorted.
 static uint32_t sample(const double *staged, uint64_t count, double axes[3][SAMPLES])
@@ -35,7 +30,7 @@ static uint32_t sample(const double *staged, uint64_t count, double axes[3][SAMP
         n++;
     }
     for (int axis = 0; axis < 3; axis++)
-        qsort(axes[axis], n, sizeof(double), compare);
+        qsort(axes[axis], n, sizeof(double), pt_compare_doubles);
     return n;
 }
 

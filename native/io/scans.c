@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a file's scans are: in which direction the scanner looked, and how far apart its samples lie.
 #include "file.h"
+#include "base/compare.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -43,12 +44,6 @@ static void measure_direction(const struct patina_file *file, struct pt_scan *sc
         scan->direction[k] = known ? sum[k] / length : 0;
 }
 
-static int compare(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double way_between(const float *a, const float *b)
 {
     double square = 0;
@@ -73,7 +68,7 @@ static void measure_interval(const struct patina_file *file, struct pt_scan *sca
                 ways[found++] = way;
         }
     }
-    qsort(ways, found, sizeof *ways, compare);
+    qsort(ways, found, sizeof *ways, pt_compare_doubles);
     scan->interval = found ? ways[found / 2] : 0;
 }
 

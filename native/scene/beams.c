@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "beams.h"
 #include "base/elementary.h"
+#include "base/vector.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,8 +23,6 @@
     0.3 // intervals: neighbours nearer, or farther than MOST_BESIDE, say nothing; nor do those ASIDE of the row
 #define MOST_BESIDE 1.6
 #define ASIDE 0.8
-
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 int pt_beams_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_pool *pool,
                     struct pt_beams *out)
@@ -55,7 +54,7 @@ void pt_beams_destroy(struct pt_beams *beams)
 // v as the beam along `ray` carries it onto the plane across n.
 static void carry(const double v[3], const double ray[3], const double n[3], double facing, double out[3])
 {
-    const double along = dot(v, n) / facing;
+    const double along = pt_dot(v, n) / facing;
     for (int k = 0; k < 3; k++)
         out[k] = v[k] - along * ray[k];
 }
@@ -65,14 +64,14 @@ static void carry(const double v[3], const double ray[3], const double n[3], dou
 static void look_beside(const struct pt_sample *sample, const double ray[3], const double n[3], double facing,
                         const double a[3], const double b[3], double near, int beside[2])
 {
-    const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), determinant = aa * bb - ab * ab;
+    const double aa = pt_dot(a, a), bb = pt_dot(b, b), ab = pt_dot(a, b), determinant = aa * bb - ab * ab;
     int sides = 0;
     for (uint32_t i = 0; i < sample->count && sides != 15; i++) {
         double o[3];
-        if (fabs(dot(sample->offset[i], n)) > near)
+        if (fabs(pt_dot(sample->offset[i], n)) > near)
             continue;
         carry(sample->offset[i], ray, n, facing, o);
-        const double oa = dot(o, a), ob = dot(o, b), s = (bb * oa - ab * ob) / determinant,
+        const double oa = pt_dot(o, a), ob = pt_dot(o, b), s = (bb * oa - ab * ob) / determinant,
                      t = (aa * ob - ab * oa) / determinant;
         if (fabs(s) > LEAST_BESIDE && fabs(s) < MOST_BESIDE && fabs(t) < ASIDE)
             sides |= s > 0.0 ? 1 : 2;
@@ -89,7 +88,7 @@ void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct p
     int beside[2];
     for (int k = 0; k < 3; k++)
         ray[k] = p[k] - beam->place[k];
-    const double range = sqrt(dot(ray, ray)), level = sqrt(ray[0] * ray[0] + ray[1] * ray[1]);
+    const double range = sqrt(pt_dot(ray, ray)), level = sqrt(ray[0] * ray[0] + ray[1] * ray[1]);
     const struct pt_interval *interval = &beam->interval;
     const double width = range * sqrt(interval->azimuth * interval->elevation);
     if (!(width > 0.0))
@@ -108,7 +107,7 @@ void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct p
     up[0] = across[1] * ray[2] - across[2] * ray[1];
     up[1] = across[2] * ray[0] - across[0] * ray[2];
     up[2] = across[0] * ray[1] - across[1] * ray[0];
-    double facing = dot(ray, hood->normal);
+    double facing = pt_dot(ray, hood->normal);
     facing = fabs(facing) < FLATTEST ? (facing < 0.0 ? -FLATTEST : FLATTEST) : facing;
     for (int k = 0; k < 3; k++) {
         across[k] *= range * interval->azimuth * (interval->even ? 1.0 : fmax(level / range, 0.1));

@@ -3,6 +3,7 @@
 #include "io/grid.h"
 #include "base/platform.h"
 #include "base/progress.h"
+#include "base/vector.h"
 #include "shared/words.h"
 
 #include <math.h>
@@ -184,8 +185,6 @@ void pt_grids_destroy(struct pt_grids *grids)
 
 // ---- a point --------------------------------------------------------------------------------------------------------------------
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 struct looker {
     const struct pt_grid *grid;
     int64_t column, row;
@@ -211,9 +210,9 @@ static enum side look(const struct looker *l, int dc, int dr, double v[3])
         return SIDE_END;
     for (int k = 0; k < 3; k++)
         v[k] = (double)l->grid->position[3 * (size_t)point + (size_t)k] - l->p[k];
-    const double depth = dot(v, l->towards), way = sqrt(fmax(dot(v, v) - depth * depth, 0.0));
+    const double depth = pt_dot(v, l->towards), way = sqrt(fmax(pt_dot(v, v) - depth * depth, 0.0));
     const int on = fabs(depth) <= STEEP * way + NOISE * l->grid->sigma ||
-                   (l->normal && fabs(dot(v, l->normal)) <= fmax(ON_PLANE * way, 3.0 * l->sigma));
+                   (l->normal && fabs(pt_dot(v, l->normal)) <= fmax(ON_PLANE * way, 3.0 * l->sigma));
     for (int k = 0; k < 3; k++)
         v[k] /= far;
     if (on)
@@ -233,10 +232,10 @@ static int span_of(const struct looker *l, int dc, int dr, const double normal[3
                : first == SIDE_ON                    ? -before[k]
                : second == SIDE_ON                   ? behind[k]
                                                      : 0.0;
-    const double off = dot(a, normal);
+    const double off = pt_dot(a, normal);
     for (int k = 0; k < 3; k++)
         a[k] -= off * normal[k];
-    return *on > 0 && dot(a, a) > 0.0;
+    return *on > 0 && pt_dot(a, a) > 0.0;
 }
 
 // Where no neighbour tells how wide a cell is along one line: as wide as along the other, across it.
@@ -256,9 +255,9 @@ static double roughness(const struct looker *l, const double normal[3])
         for (int dr = -1; dr <= 1; dr++) {
             if ((!dc && !dr) || look(l, dc, dr, v) != SIDE_ON)
                 continue;
-            const double off = dot(v, normal);
+            const double off = pt_dot(v, normal);
             squares += off * off;
-            ways += dot(v, v);
+            ways += pt_dot(v, v);
             count++;
         }
     return count >= 3 && ways > 0.0 ? sqrt(squares / ways) : INFINITY;
@@ -312,7 +311,7 @@ int pt_grids_describe(const struct pt_grids *grids, const patina_analysis_desc *
         hood->certainty = fmax(hood->certainty, CERTAIN * (1.0 - rough));
     }
     if (hood->has_normal) {
-        const double side = dot(hood->normal, l.towards) < 0.0 ? -1.0 : 1.0;
+        const double side = pt_dot(hood->normal, l.towards) < 0.0 ? -1.0 : 1.0;
         for (int k = 0; k < 3; k++)
             hood->normal[k] *= side;
         hood->sided = 1;

@@ -2,6 +2,7 @@
 // Kinds and footprints: from the plane through a point's neighbours to what a picture may close with it.
 #include "neighbourhood.h"
 #include "base/elementary.h"
+#include "base/vector.h"
 #include "shared/words.h"
 
 #include <math.h>
@@ -61,12 +62,10 @@ static void cover(double along, double across, struct pt_neighbourhood *out)
 
 // ------------------------------------------------------------------------------------------------------------------------------
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 static double distance_squared(const double a[3], const double b[3])
 {
     const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-    return dot(d, d);
+    return pt_dot(d, d);
 }
 
 static double nearest_of(const struct pt_sample *sample, uint32_t *distinct)
@@ -122,7 +121,7 @@ static int is_stray(const struct pt_sample *sample, struct pt_neighbourhood *out
     for (uint32_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++)
             mean[k] += sample->offset[i][k] / count;
-    if (dot(mean, mean) < STRAY_OFFSET * STRAY_OFFSET * sample->square[count - 1])
+    if (pt_dot(mean, mean) < STRAY_OFFSET * STRAY_OFFSET * sample->square[count - 1])
         return 0;
     const double mutual = mutual_distance(sample, NULL), second = sqrt(sample->square[1]);
     if (!(second > STRAY_DISTANCE * mutual) || !(mutual > 0.0))
@@ -133,13 +132,14 @@ static int is_stray(const struct pt_sample *sample, struct pt_neighbourhood *out
 
 void pt_ellipse_of(const double a[3], const double b[3], double axis[3], double *major, double *minor)
 {
-    const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), half = 0.5 * (aa - bb), root = sqrt(half * half + ab * ab);
+    const double aa = pt_dot(a, a), bb = pt_dot(b, b), ab = pt_dot(a, b), half = 0.5 * (aa - bb),
+                 root = sqrt(half * half + ab * ab);
     const double turn = 0.5 * pt_atan2(ab, half), c = pt_cos(turn), s = pt_sin(turn);
     for (int k = 0; k < 3; k++)
         axis[k] = c * a[k] + s * b[k];
     *major = sqrt(0.5 * (aa + bb) + root);
     *minor = sqrt(fmax(0.5 * (aa + bb) - root, 0.0));
-    const double length = sqrt(dot(axis, axis));
+    const double length = sqrt(pt_dot(axis, axis));
     for (int k = 0; k < 3; k++)
         axis[k] = length > 0.0 ? axis[k] / length : a[k];
 }
@@ -157,7 +157,7 @@ static void flatten(const struct pt_sample *sample, const struct pt_plane *plane
     double most = 0.0, sum[2] = {0.0, 0.0};
     flat->count = 0;
     for (uint32_t i = 0; i < sample->count; i++) {
-        const double u = dot(plane->axis[2], sample->offset[i]), v = dot(plane->axis[1], sample->offset[i]);
+        const double u = pt_dot(plane->axis[2], sample->offset[i]), v = pt_dot(plane->axis[1], sample->offset[i]);
         if (!(plane->inside >> i & 1u) || !(u * u + v * v > 0.0))
             continue;
         flat->u[flat->count] = u;
@@ -431,7 +431,7 @@ static void be_part(const struct pt_sample *own, const struct pt_plane *plane, d
     hood->has_normal = 1;
     hood->sided = whole.sided;
     hood->sigma = hood->sigma > 0.0 ? fmin(hood->sigma, whole.sigma) : whole.sigma;
-    const double up = dot(hood->axis, hood->normal), length = sqrt(fmax(1.0 - up * up, 0.0));
+    const double up = pt_dot(hood->axis, hood->normal), length = sqrt(fmax(1.0 - up * up, 0.0));
     if (hood->kind != PT_KIND_LINE || !(length > 0.1))
         return;
     for (int k = 0; k < 3; k++)

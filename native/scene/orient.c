@@ -4,6 +4,7 @@
 // the grid) neighbours with like normals tell. A sheet that is seen from both sides faces up.
 #include "orient.h"
 #include "analysis.h"
+#include "base/compare.h"
 #include "base/platform.h"
 #include "base/progress.h"
 #include "shared/words.h"
@@ -48,16 +49,10 @@ struct weighed {
     uint32_t weight;
 };
 
-static int compare_weighed(const void *a, const void *b)
-{
-    double x = ((const struct weighed *)a)->value, y = ((const struct weighed *)b)->value;
-    return (x > y) - (x < y);
-}
-
 static double quantile(struct weighed *list, uint32_t count, double share)
 {
     double sum = 0.0, below = 0.0;
-    qsort(list, count, sizeof *list, compare_weighed);
+    qsort(list, count, sizeof *list, pt_compare_doubles);
     for (uint32_t i = 0; i < count; i++)
         sum += list[i].weight;
     for (uint32_t i = 0; i < count; i++)

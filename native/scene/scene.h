@@ -6,6 +6,7 @@
 #include "cloud.h"
 #include "mesh.h"
 #include "texture.h"
+#include "base/vector.h"
 
 #include <math.h>
 
@@ -84,7 +85,6 @@ double pt_determinant(const double m[9]);
 void pt_cofactors(const double m[9], double out[9]); // inverse transposed = cofactors / determinant
 double pt_invert(const double m[9], double out[9]);  // returns the determinant; out is anything where that is 0
 void pt_multiply(const double a[9], const double b[9], double out[9]);
-static inline double pt_dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 static inline void pt_apply(const double m[9], const double v[3], double out[3])
 {
     for (int r = 0; r < 3; r++)

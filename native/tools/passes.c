@@ -2,6 +2,7 @@
 // --pass: a pass in place of the colours. Numbers go through a ramp, normals turn to colours as is usual, (n + 1) / 2.
 #include "tool.h"
 #include "base/color.h"
+#include "base/compare.h"
 #include "base/words.h"
 
 #include <ctype.h>
@@ -39,12 +40,6 @@ int tool_parse_pass(const char *value, struct tool_options *options)
                : 0;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 // Zero says that nothing is known.
 static int is_known(uint32_t pass, float value) { return pass != PATINA_PASS_THICKNESS || value > 0.0f; }
 
@@ -73,7 +68,7 @@ static int find_range(uint32_t pass, const float *values, const float *depth, si
     for (size_t i = 0; i < count; i++)
         if (shows(pass, values[i], depth[i]) && is_known(pass, values[i]))
             sorted[known++] = fabsf(values[i]);
-    qsort(sorted, known, sizeof *sorted, compare_floats);
+    qsort(sorted, known, sizeof *sorted, pt_compare_floats);
     if (known) {
         range[0] = from_zero(pass) ? 0.0 : (double)sorted[known / 100];
         range[1] = (double)sorted[known - 1 - known / 100];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Times of frames and passes, medians, and the JSON object that `--stats json` prints.
 #include "tool.h"
+#include "base/compare.h"
 #include "base/words.h"
 
 #include <math.h>
@@ -137,19 +138,13 @@ int tool_times_add(struct tool_times *times, double ms, const patina_frame *fram
     return 0;
 }
 
-static int compare(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double median(const double *values, int count)
 {
     double *sorted = count ? malloc((size_t)count * sizeof *sorted) : NULL;
     if (!sorted)
         return 0;
     memcpy(sorted, values, (size_t)count * sizeof *sorted);
-    qsort(sorted, (size_t)count, sizeof *sorted, compare);
+    qsort(sorted, (size_t)count, sizeof *sorted, pt_compare_doubles);
     const double result = (sorted[(count - 1) / 2] + sorted[count / 2]) / 2;
     free(sorted);
     return result;

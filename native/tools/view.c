@@ -2,17 +2,16 @@
 // Cameras and lights of `patina render`.
 #include "view.h"
 #include "base/elementary.h"
+#include "base/vector.h"
 
 #include <math.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 static void normalize(double v[3])
 {
-    const double length = sqrt(dot(v, v));
+    const double length = sqrt(pt_dot(v, v));
     for (int i = 0; i < 3; i++)
         v[i] /= length;
 }
@@ -121,7 +120,7 @@ static patina_light_desc sun_from(const patina_camera *camera, const double from
     patina_light_desc light = {.struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = power};
     memcpy(light.color, color, sizeof light.color);
     for (int i = 0; i < 3; i++)
-        light.direction[i] = -dot(camera->world_from_camera + 4 * i, from);
+        light.direction[i] = -pt_dot(camera->world_from_camera + 4 * i, from);
     return light;
 }
 
