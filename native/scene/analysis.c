@@ -404,14 +404,12 @@ int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *des
     return error ? error : pt_free_space_check(desc);
 }
 
-static void gather_shapes(struct pt_analysis *out, struct pt_chunk *chunk)
+static void gather_shapes(struct pt_chunk *chunk, const uint32_t *shapes)
 {
-    const uint32_t *shapes = out->shapes + chunk->first;
     memset(chunk->shapes, 0, sizeof chunk->shapes);
     for (uint32_t i = 0; i < chunk->count; i++) {
         const uint32_t sight = shapes[i] >> PT_SHAPE_SIGHT_SHIFT & 255u;
         chunk->shapes[sight / 32] |= 1u << sight % 32;
-        out->trusts[shapes[i] >> PT_SHAPE_TRUST_SHIFT & 15u]++;
     }
 }
 
@@ -501,6 +499,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     walk->rows = !walk->beams.count && lies_in_rows(walk); // a station's cells tell better
     pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
     error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : judge(walk, pool);
+    memcpy(out->trusts, walk->trust.counts, sizeof out->trusts);
     pt_trust_destroy(&walk->trust);
     pt_neighbours_destroy(&walk->coarse);
     error = error ? error : vote_sides(walk, pool);
@@ -516,7 +515,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     }
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         pt_store_look(walk->store);
-        gather_shapes(out, &out->chunks[c]);
+        gather_shapes(&out->chunks[c], out->shapes + out->chunks[c].first);
         out->chunks[c].cone_cosine = -2.0f;
         if (out->oriented)
             pt_chunk_cone(&out->chunks[c], out->surfels + out->chunks[c].first);

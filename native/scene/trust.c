@@ -6,7 +6,9 @@
 #include "trust.h"
 #include "analysis.h"
 #include "trust_features.h"
+#include "base/compare.h"
 #include "base/progress.h"
+#include "base/vector.h"
 #include "shared/words.h"
 
 #include <math.h>
@@ -51,6 +53,8 @@ static double length_of(uint8_t byte, double unit)
 int pt_trust_create(struct pt_trust *trust)
 {
     const size_t places = (size_t)trust->tree->leaf_count * PT_LEAF;
+    for (uint32_t i = 0; i <= PT_SHAPE_CLASS_BITS; i++)
+        trust->classes[i] = pt_spacing_of_class(i);
     trust->reach = pt_store_alloc(trust->tree->store, places);
     trust->used = pt_store_alloc(trust->tree->store, places);
     return trust->reach && trust->used ? PATINA_OK : PATINA_ERROR_MEMORY;
@@ -104,8 +108,6 @@ struct around { // of a point's nearest K
     double sigma[K];
 };
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 static uint32_t word_at(const struct pt_trust *trust, uint32_t slot)
 {
     return atomic_load_explicit(&trust->shapes[slot], memory_order_relaxed);
@@ -113,9 +115,7 @@ static uint32_t word_at(const struct pt_trust *trust, uint32_t slot)
 
 static double sigma_of(const struct pt_trust *trust, uint32_t word)
 {
-    static const double quarters[4] = {1.0, 1.189207115002721, 1.4142135623730951, 1.681792830507429};
-    const uint32_t class = word >> PT_SHAPE_SIGMA_SHIFT & PT_SHAPE_CLASS_BITS;
-    return class ? trust->base / 16.0 * ldexp(quarters[(class - 1) & 3u], (int)((class - 1) >> 2)) : 0.0;
+    return trust->base / 16.0 * trust->classes[word >> PT_SHAPE_SIGMA_SHIFT & PT_SHAPE_CLASS_BITS];
 }
 
 // 0: a neighbor's reach is not known, or all of them lie at one place.
@@ -144,7 +144,7 @@ static double offset_of(const struct pt_sample *sample, uint32_t count)
     for (uint32_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++)
             mean[k] += sample->offset[i][k] / count;
-    return sqrt(dot(mean, mean));
+    return sqrt(pt_dot(mean, mean));
 }
 
 static void compare_reach(const struct pt_sample *sample, const struct around *around, float f[])
@@ -174,7 +174,7 @@ static double part(double a, double b) { return b > 0.0 ? a / b : 0.0; }
 static void compare_planes(const struct pt_trust *trust, const struct pt_sample *sample, const struct around *around,
                            const uint32_t *places, const struct pt_plane *plane, float f[])
 {
-    const double d16 = around->far[K - 1], residual = fabs(dot(plane->axis[0], plane->mean));
+    const double d16 = around->far[K - 1], residual = fabs(pt_dot(plane->axis[0], plane->mean));
     double least = INFINITY, mean = 0.0, in_sigmas = INFINITY, sigmas = 0.0, cosine = 0.0, worst = 1.0;
     uint32_t count = 0;
     for (uint32_t i = 0; i < NEAR; i++) {
@@ -183,8 +183,8 @@ static void compare_planes(const struct pt_trust *trust, const struct pt_sample 
         if (bits == PT_NORMAL_NONE)
             continue;
         pt_decode_normal(bits, n);
-        const double off = fabs(dot(n, sample->offset[i])), parts = off / (around->sigma[i] + 0.02 * around->reach[i]);
-        const double facing = fabs(dot(n, plane->axis[0]));
+        const double off = fabs(pt_dot(n, sample->offset[i])), parts = off / (around->sigma[i] + 0.02 * around->reach[i]);
+        const double facing = fabs(pt_dot(n, plane->axis[0]));
         least = off < least ? off : least;
         in_sigmas = parts < in_sigmas ? parts : in_sigmas;
         worst = facing < worst ? facing : worst;
@@ -237,11 +237,11 @@ static void compare_sight(const struct pt_trust *trust, const struct pt_chunk *c
     const struct pt_beam *beam = &trust->beams->each[pt_station_of(trust->desc, pt_number_of(trust->cloud, slot), p)];
     for (int k = 0; k < 3; k++)
         way[k] = p[k] - beam->place[k];
-    const double range = sqrt(dot(way, way));
+    const double range = sqrt(pt_dot(way, way));
     if (!(range > 0.0))
         return;
-    f[PT_TRUST_ALONG] = (float)fabs(dot(way, plane->axis[2]) / range);
-    f[PT_TRUST_FACING] = (float)fabs(dot(way, plane->axis[0]) / range);
+    f[PT_TRUST_ALONG] = (float)fabs(pt_dot(way, plane->axis[2]) / range);
+    f[PT_TRUST_FACING] = (float)fabs(pt_dot(way, plane->axis[0]) / range);
     f[PT_TRUST_INTERVAL] = (float)part(d16, range * beam->interval.elevation);
 }
 
@@ -329,7 +329,7 @@ static void move_place(struct pt_neighbours *tree, uint32_t place, const float a
 // Finds the least level of trusted points, and returns how many points are below it.
 static uint64_t count_hidden(struct pt_trust *trust)
 {
-    uint64_t counts[PT_TRUST_LEVELS] = {0}, below = 0;
+    uint64_t *counts = trust->counts, below = 0;
     for (uint32_t c = 0; c < trust->cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &trust->cloud->chunks[c];
         for (uint32_t i = 0; i < chunk->count; i++)
@@ -342,12 +342,6 @@ static uint64_t count_hidden(struct pt_trust *trust)
     return below;
 }
 
-static int compare_slots(const void *a, const void *b)
-{
-    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
 // The coarse tree's places of a chunk's untrusted points, into its `hidden` from `first` on.
 static void find_coarse(struct pt_trust *trust, uint32_t c, uint64_t first, uint64_t *pairs)
 {
@@ -355,7 +349,7 @@ static void find_coarse(struct pt_trust *trust, uint32_t c, uint64_t first, uint
     const struct pt_neighbours *coarse = trust->coarse;
     for (uint64_t i = 0; i < count; i++)
         pairs[i] = (uint64_t)trust->tree->slots[trust->hidden[first + i].place] << 32 | i;
-    qsort(pairs, count, sizeof *pairs, compare_slots);
+    qsort(pairs, count, sizeof *pairs, pt_compare_u64);
     for (uint32_t leaf = coarse->chunk_leaf[c]; leaf < coarse->chunk_leaf[c + 1] && count; leaf++)
         for (uint32_t left = pt_leaf_lanes(coarse, leaf); left; left &= left - 1) {
             const uint32_t place = leaf * PT_LEAF + (uint32_t)__builtin_ctz(left);

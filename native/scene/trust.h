@@ -5,6 +5,7 @@
 
 #include "beams.h"
 #include "neighbourhood.h"
+#include "shared/words.h"
 
 enum { PT_TRUST_NEIGHBOURS = 16, PT_TRUST_FEATURES = PATINA_TRUST_FEATURES };
 
@@ -14,12 +15,14 @@ struct pt_trust {
     struct pt_neighbours *tree, *coarse;
     const patina_analysis_desc *desc;
     const struct pt_beams *beams;
-    const struct pt_chunk *chunks; // with the spacings that the first walk found
-    const uint32_t *surfels;       // slots
-    _Atomic uint32_t *shapes;      // slots; the judgement writes PT_SHAPE_TRUST_BITS alone
-    uint8_t *reach, *used;         // a place: distance to the 16th neighbor; to the farthest that described the point
-    double base;                   // unit of spacings
-    uint32_t least;                // level that trusted points have at least: pt_trust_hide finds it
+    const struct pt_chunk *chunks;           // with the spacings that the first walk found
+    const uint32_t *surfels;                 // slots
+    _Atomic uint32_t *shapes;                // slots; the judgement writes PT_SHAPE_TRUST_BITS alone
+    uint8_t *reach, *used;                   // a place: distance to the 16th neighbor; to the farthest that described the point
+    double base;                             // unit of spacings
+    double classes[PT_SHAPE_CLASS_BITS + 1]; // in units
+    uint64_t counts[PT_TRUST_LEVELS];        // points of each level, and
+    uint32_t least;                          // the level that trusted points have at least: pt_trust_hide finds both
     patina_progress *progress;
     struct pt_hidden *hidden; // untrusted points that are out of the trees, by chunk
     uint32_t *hidden_first;   // a chunk, and one past the last
