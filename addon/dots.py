@@ -13,12 +13,12 @@ PAPER, OPEN, MEASURED = 1, 2, 0  # PATINA_QUALITY_PAPER, PATINA_FILL_OFF, PATINA
 SEEN_THROUGH = 2  # PATINA_FREE_SPACE_USE: such points are left out
 
 
-def left_out(description: SceneDescription, own: Sequence[Clip]) -> SceneDescription | None:
+def left_out(description: SceneDescription, own: Sequence[Clip], untrusted: bool) -> SceneDescription | None:
     """The points of those clouds that are not drawn whole, without anything that is for their colors; None where all are. own: clips
-    that cut Blender's dots as well."""
+    that cut Blender's dots as well. untrusted: the picture left out points for their trust."""
     cut = len(description.clips) > len(own)
     clouds = [CloudItem(item.cloud, _whole(item.style), 0, name=item.name) for item in description.clouds
-              if item.dotted and (item.soft or item.edits.hidden or _leaves_out(item.style, cut))]
+              if item.dotted and (item.soft or item.edits.hidden or _leaves_out(item.style, cut, untrusted))]
     if not clouds:
         return None
     settings = replace(description.settings, quality=PAPER, fill=OPEN, surface=MEASURED, smooth=0, antialias=0, layers=1, average=0,
@@ -27,9 +27,9 @@ def left_out(description: SceneDescription, own: Sequence[Clip]) -> SceneDescrip
                    effects=description.effects.focus_alone().through(None), settings=settings, shadow_file="", notices=[])
 
 
-def _leaves_out(style: CloudStyle, cut: bool) -> bool:
-    return bool(cut and not style.clip_off or any(style.hidden_classes) or style.hidden_kinds or style.least_trust > 0.0 or
-                style.free_space == SEEN_THROUGH)
+def _leaves_out(style: CloudStyle, cut: bool, untrusted: bool) -> bool:
+    return bool(cut and not style.clip_off or any(style.hidden_classes) or style.hidden_kinds or untrusted and style.least_trust >= 0.0
+                or style.free_space == SEEN_THROUGH)
 
 
 def _whole(style: CloudStyle) -> CloudStyle:

@@ -520,7 +520,8 @@ class Viewport:
             colors += yield from self._draw_frame(beside, other, ("COMBINED",), [])
         hiding = self._without_own(frame, description, depth)
         if hiding is not None:
-            yield from self._hide_dots(device, dots.left_out(description, wish.clips), hiding)
+            untrusted = any(part.stats()["untrusted"] for part, _ in parts)
+            yield from self._hide_dots(device, dots.left_out(description, wish.clips, untrusted), hiding)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         if not self._many or wish.detail == pace.MOVING:  # that of others says nothing of pictures while the view moves

@@ -297,7 +297,6 @@ class Cloud(_Handle):
         self.has_shapes = bool(info.has_shapes)  # analysed
         self.normals_oriented = bool(info.normals_oriented)
         self.kinds = tuple(info.kinds)  # points of each of KINDS
-        self.trusts = tuple(info.trusts)  # points of each level of trust
         self.seen_through = info.seen_through  # points that a station saw through
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))

@@ -205,6 +205,25 @@ def test_what_is_left_out_shows_no_dots():
     check(max(counts.values()) < LETTERS and whole < LETTERS, f"dark pixels: whole {whole}, {counts}")
 
 
+def test_untrusted_points_show_no_dots():
+    """They are left out by default."""
+    _, points = bright_scene()
+    rng = np.random.default_rng(5)
+    positions, colors, normals = sphere(60000, 1.5, (0, 0, 0))
+    strays = rng.uniform(-2.0, 2.0, (20000, 3))
+    strays = strays[np.linalg.norm(strays, axis=1) > 1.7].astype(np.float32)
+    colors = np.tile(np.uint8([220, 180, 140, 255]), (len(positions) + len(strays), 1))
+    bpy.data.objects.remove(points)
+    points = add_points(np.concatenate([positions, strays]), colors, np.concatenate([normals, np.zeros_like(strays)]))
+    points.patina.lighting = 'UNLIT'
+    yield at_rest()
+    points.select_set(False)
+    yield at_rest()
+    untrusted = next(found for found in viewport._VIEWPORTS if found.shown).shown.stats["untrusted"]
+    check(untrusted > 2000, f"of {len(strays)} strays {untrusted} are untrusted")
+    check(dark_pixels() < LETTERS, f"dark pixels: {dark_pixels()}")
+
+
 def test_a_new_size_shows_no_stretched_picture():
     """The redraw after it waits for the picture; here as long as a machine with other work may need."""
     bright_scene()
