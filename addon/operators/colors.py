@@ -54,7 +54,7 @@ class PATINA_OT_robust_range(_ColorOperator, Operator):
         obj = context.object
         group = obj.patina.colors
         try:
-            found = _linked_range(obj, context.scene.frame_current) if obj.patina.linked_file else _range(obj)
+            found = _linked_range(obj, context.scene.frame_current) if obj.patina.linked_file else range_of(obj, SHARE)
         except native.PatinaError as error:
             self.report({'ERROR'}, f"Patina: {error}")
             return {'CANCELLED'}
@@ -66,7 +66,8 @@ class PATINA_OT_robust_range(_ColorOperator, Operator):
         return {'FINISHED'}
 
 
-def _range(obj: bpy.types.Object) -> tuple[float, float] | None:
+def range_of(obj: bpy.types.Object, share: float) -> tuple[float, float] | None:
+    """Of what colors points that Blender holds: without a share of them at either end. None: nothing finite does."""
     group, data = obj.patina.colors, obj.data
     count = point_data.count_of(data)
     if group.source == 'SCALAR':
@@ -81,7 +82,7 @@ def _range(obj: bpy.types.Object) -> tuple[float, float] | None:
     values = None if values is None else values[np.isfinite(values)]
     if values is None or not len(values):
         return None
-    return tuple(float(value) for value in np.quantile(values, (SHARE, 1.0 - SHARE)))
+    return tuple(float(value) for value in np.quantile(values, (share, 1.0 - share)))
 
 
 def _linked_range(obj: bpy.types.Object, frame: int) -> tuple[float, float] | None:

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from enum import Enum
 
 import bpy
-import numpy as np
 from bpy.types import Object, Scene
 
 from .. import jobs, native, point_data
 from ..sync import attributes, linked
-from . import view_transform
+from . import colors, view_transform
 
 PLASTER = "plaster"  # the style of points that have positions alone
 INTENSITY = ("intensity", "reflectance", "amplitude", "grey", "gray", "scalar_intensity")  # names in lower case, the first found counts
@@ -83,13 +82,11 @@ def _intensity(obj: Object) -> str:
 def _show_intensity(obj: Object) -> str:
     name = _intensity(obj)
     _show_scalar(obj, name, 'GREY')
-    values = attributes.scalars(obj.data, point_data.count_of(obj.data), name)
-    values = values[np.isfinite(values)] if values is not None else np.empty(0)
     group = obj.patina.colors
-    if len(values) and values.min() < values.max():
-        low, high = (float(value) for value in np.quantile(values, (SHARE, 1.0 - SHARE)))
-        group.range_min, group.range_max = (low, high) if low < high else (float(values.min()), float(values.max()))
-        group.use_range = True
+    for share in (0.0, SHARE):
+        low, high = colors.range_of(obj, share) or (0.0, 0.0)
+        if low < high:
+            group.range_min, group.range_max, group.use_range = low, high, True
     return f"'{obj.name}' is colored by '{name}'"
 
 
