@@ -14,12 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from . import backdrop
+from .native.abi import LIGHTING
 from .sync import CloudItem, MeshItem, SceneDescription
-from .sync.clouds import LIT
 from .sync.colors import FIXED
 from .sync.roles import CATCHER, HOLDOUT
 
-UNLIT = 1  # PATINA_LIGHTING_UNLIT
 NO_CAST, NO_SELF = 1, 4  # of patina_shadow_off
 BLACK, WHITE = (0.0,) * 3, (1.0,) * 3
 CHANNELS = RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -94,7 +93,7 @@ def _flat(item: Item, color: tuple[float, float, float]) -> Item:
         texture = item.texture and item.texture.flat(color)
         style = replace(item.style, color=color, unlit=0, alpha=item.style.alpha if texture else 0)
         return replace(item, mesh=item.mesh.bare or item.mesh if texture is None else item.mesh, style=style, texture=texture)
-    style = replace(item.style, lighting=UNLIT, color_source=FIXED, color=color, ramp=b"", exposure=0.0, contrast=1.0,
+    style = replace(item.style, lighting=LIGHTING["UNLIT"], color_source=FIXED, color=color, ramp=b"", exposure=0.0, contrast=1.0,
                     free_space=item.style.free_space & 2)  # what is only marked gets the color too
     return replace(item, style=style)
 
@@ -104,4 +103,4 @@ def _lit(item: Item) -> Item:
     if isinstance(item, MeshItem):
         return replace(white, style=replace(white.style, shadow_off=white.style.shadow_off & ~2 | NO_CAST))  # nor on itself
     style = white.style
-    return replace(white, style=replace(style, lighting=LIT, specular=0.0, shadow_off=style.shadow_off & ~2 | NO_SELF))
+    return replace(white, style=replace(style, lighting=LIGHTING["LIT"], specular=0.0, shadow_off=style.shadow_off & ~2 | NO_SELF))

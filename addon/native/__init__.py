@@ -49,7 +49,6 @@ __all__ = ["CANCELLED", "FILE", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_L
 
 
 KINDS = tuple(abi.KIND)  # patina_kind
-TRUST_DEFAULT = 0.64  # PATINA_TRUST_DEFAULT
 WRAPS = tuple(abi.WRAP)  # patina_wrap
 NO_PAGE = 2 ** 32 - 1  # PATINA_NO_PAGE
 _losses = [0]  # pictures that lacked points of files that cannot be read any more

@@ -12,6 +12,8 @@ VERSION = (0, 1)  # of the header; the patch number may differ
 
 SIDES_VOTED = 2
 TRUST_FEATURES = 33
+TRUST_DEFAULT = 0.64
+TRUST_MOST = 0.84
 MAX_RAMP = 256
 MAX_LAYERS = 16
 

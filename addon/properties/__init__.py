@@ -11,6 +11,7 @@ from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume, 
 
 from .. import styles
 from ..native import MOST_LAYERS
+from ..native.abi import TRUST_DEFAULT
 from .automatic import switch
 from .brush import PatinaBrushProperties
 from .clips import PatinaClipProperties
@@ -285,7 +286,7 @@ class PatinaObjectProperties(PropertyGroup):
         name="Unclassified", override=_OVERRIDE, default=False,
         description="Points of the classes 0, never classified, and 1, unassigned, are not drawn and cast no shadow")
     least_trust: FloatProperty(
-        name="Trust", override=_OVERRIDE, default=0.64, min=0.0, max=1.0, subtype='FACTOR',
+        name="Trust", override=_OVERRIDE, default=TRUST_DEFAULT, min=0.0, max=1.0, subtype='FACTOR',
         description="Points of less trust are not drawn and cast no shadow. Trust is the probability that a point lies on a surface, "
                     "and is no mixed pixel or stray. At its default Patina raises it for each cloud, up to 0.84. At zero, all points are drawn")
     opacity: FloatProperty(

@@ -16,6 +16,7 @@ from mathutils import Matrix
 from .. import jobs, native, pairs, point_data
 from ..importers import Progress
 from ..jobs import Steps
+from ..native.abi import LIGHTING
 from ..properties import enum_number
 from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, ranges, roles, soft, splats
 from .analyzing import ANALYSES
@@ -25,8 +26,6 @@ from .scans_of import SCAN_NAMES, Scans, scans_in
 # Clouds that the last picture did not use may stay up to this many bytes (24 a point): enough for the other view
 # layers and scenes of a session, little beside what Blender itself holds for the same points.
 IDLE_BYTES = 1 << 30
-
-LIT = 2  # PATINA_LIGHTING_LIT
 
 SMALL = 1 << 14  # points: fewer are worked on by one thread each, in the library too
 AT_ONCE = 16  # small clouds
@@ -336,7 +335,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
         elif cloud:
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
-                style = replace(style, lighting=LIT)
+                style = replace(style, lighting=LIGHTING["LIT"])
             edited = edits.state_of(obj)
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
             told = ranges.told_of(obj, patina.surface)
@@ -635,13 +634,6 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, bool(analyzed), stations, by, scans, scan_of)
 
 
-def least_trust(patina: bpy.types.PropertyGroup) -> float:
-    """As the library takes it: 0 is its default, and what is below 0 draws all points."""
-    if patina.least_trust <= 0.0:
-        return -1.0
-    return 0.0 if abs(patina.least_trust - native.TRUST_DEFAULT) < 1e-6 else patina.least_trust
-
-
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
     patina = obj.patina
     return CloudStyle(
@@ -660,7 +652,7 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         largest_gap=patina.largest_gap,
         free_space=enum_number(patina, "free_space"),
         hidden_kinds=int(patina.hide_stray) << native.KINDS.index("STRAY"),
-        least_trust=least_trust(patina),
+        least_trust=analysis.least_trust(patina),
         **ranges.style_fields(obj), **colors.style_fields(obj))
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import bpy
 from mathutils import Matrix, Vector
 
+from ..native.abi import LIGHTING
 from . import losses
 from .camera import Camera, View
 from .world import Spot, World
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from .clouds import CloudItem
 
 TYPES = {'SUN': 1, 'POINT': 2, 'SPOT': 3, 'AREA': 4}  # patina_light_type
-LIT = 2  # PATINA_LIGHTING_LIT
 MOST = 32  # lights of a scene in the library
 # Of an area light's power Cycles radiates pi / 4 in Blender 3.4, all of it in 4.2, 4.5 and 5.0: measured.
 AREA_SHARE = math.pi / 4 if bpy.app.version < (4, 2, 0) else 1.0
@@ -74,7 +74,7 @@ def missing(lights: Sequence[Light], headlight: Headlight | None, world: World) 
 
 def notice(items: Sequence[CloudItem], dark: bool) -> str:
     """What the artist reads if points are Lit and no light reaches them; "": all is well."""
-    names = [f"'{item.name}'" for item in items if dark and item.style.lighting == LIT]
+    names = [f"'{item.name}'" for item in items if dark and item.style.lighting == LIGHTING["LIT"]]
     return f"no light reaches {', '.join(names)}: use Add Light in the Points panel, or set Lighting to Unlit" if names else ""
 
 

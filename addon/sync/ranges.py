@@ -11,7 +11,7 @@ from .. import native
 from ..importers import scans
 from ..native.abi import SURFACE
 from ..native.points import ScanSet
-from . import edits
+from . import analysis, edits
 
 LEAST = 1.0  # pixel size
 LEAST_SHARPNESS = 0.5
@@ -33,7 +33,7 @@ def spare_analysis(obj: bpy.types.Object, surface: str, layer: bpy.types.ViewLay
     the same. surface: of the scene."""
     patina = obj.patina
     asked = (patina.analysis == 'ALWAYS' or patina.soft.use or patina.cull_back or patina.hide_stray
-             or patina.least_trust > 0.0 and abs(patina.least_trust - native.TRUST_DEFAULT) > 1e-6 or patina.free_space != 'OFF')
+             or analysis.least_trust(patina) > 0.0 or patina.free_space != 'OFF')
     return ((patina.ranges.use or surface == 'RANGES') and not asked
             and not (layer.patina.use_pass_trust or layer.patina.use_pass_thickness))
 
