@@ -297,17 +297,12 @@ def _owner(group: bpy.types.PropertyGroup, path: str) -> tuple[bpy.types.Propert
 # ---- applying and taking ------------------------------------------------------------------------------------------
 
 
-def is_cloud(obj: bpy.types.Object) -> bool:
-    """Whether Patina may draw the object's points."""
-    return point_data.is_cloud(obj)
-
-
 def apply_to_scene(scene: bpy.types.Scene, key: str) -> list[str]:
     """Applies a style to a scene and to those of its objects that the scene's choice names. Returns what the artist should
     know; StyleError when nothing was changed."""
     style = read(entry(key).path)
     selected = scene.patina.style.objects == 'SELECTED'
-    chosen = [obj for obj in scene.objects if is_cloud(obj) and obj.library is None and (not selected or obj.select_get())]
+    chosen = [obj for obj in scene.objects if point_data.is_cloud(obj) and obj.library is None and (not selected or obj.select_get())]
     return apply(style, scene, chosen)
 
 

@@ -224,7 +224,7 @@ def _largest_radius(obj: bpy.types.Object, name: str, frame: int) -> float:
     if not name:
         return 0.0
     with attributes.readable(obj) as data:
-        values = attributes.scalars(data, len(data.vertices if obj.type == 'MESH' else data.points), name)
+        values = attributes.scalars(data, point_data.count_of(data), name)
     values = values[np.isfinite(values)] if values is not None else np.empty(0)
     return max(float(values.max()), 0.0) if len(values) else 0.0
 

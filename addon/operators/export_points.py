@@ -17,7 +17,6 @@ from bpy_extras.io_utils import ExportHelper
 from .. import exporters, importers, jobs, native, point_data
 from ..importers import origin, scans
 from ..sync import analysis, attributes, edits, linked
-from . import set_up
 
 
 class PATINA_OT_export_points(Operator, ExportHelper):
@@ -108,7 +107,7 @@ class PATINA_OT_export_points(Operator, ExportHelper):
         depsgraph = context.evaluated_depsgraph_get()
         found = [obj.evaluated_get(depsgraph) for obj in context.view_layer.objects
                  if point_data.may_have_points(obj) and obj.visible_get() and (obj.select_get() or not self.selected)]
-        points = [obj for obj in found if set_up.is_points(obj)]
+        points = [obj for obj in found if point_data.is_cloud(obj)]
         return (points, len(found) - len(points)) if points else (found, 0)
 
 

@@ -18,20 +18,16 @@ START = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}  # what Blender b
 LEAST = 0.05  # W/m2 from a lamp that count as light; the start scene's gives a cube beside it 1.5
 
 
-def is_points(obj: Object) -> bool:
-    return point_data.is_cloud(obj)
-
-
 def untouched(scene: Scene) -> bool:
     """Whether there is nothing but points, what came with them, and what Blender's start scene holds."""
-    others = [obj for obj in scene.objects if not is_points(obj) and not _imported(obj)]
+    others = [obj for obj in scene.objects if not point_data.is_cloud(obj) and not _imported(obj)]
     return (not bpy.data.filepath and len(bpy.data.scenes) == 1 and "EEVEE" in scene.render.engine
             and all(START.get(obj.name) == obj.type for obj in others) and all(map(_as_it_came, others)))
 
 
 def _imported(obj: Object) -> bool:
     """Whether an import added it beside the points: a station, or a camera at one."""
-    return obj.parent is not None and (is_points(obj.parent) or stations.PROPERTY in obj.parent) and obj.type in {'EMPTY', 'CAMERA'} \
+    return obj.parent is not None and (point_data.is_cloud(obj.parent) or stations.PROPERTY in obj.parent) and obj.type in {'EMPTY', 'CAMERA'} \
         and (obj.type == 'CAMERA' or stations.PROPERTY in obj)
 
 
@@ -74,7 +70,7 @@ the headlight is turned on"""
 
     def execute(self, context: Context) -> set[str]:
         scene = context.scene
-        points = [obj for obj in context.view_layer.objects if is_points(obj) and obj.visible_get()]
+        points = [obj for obj in context.view_layer.objects if point_data.is_cloud(obj) and obj.visible_get()]
         if not points:
             self.report({'ERROR'}, "Patina: the scene has no points")
             return {'CANCELLED'}
@@ -116,7 +112,7 @@ def offer(context: Context) -> None:
 
 def _menu(self: bpy.types.Menu, context: Context) -> None:
     """Where it is found by its name too: F3 looks through menus."""
-    if any(map(is_points, context.view_layer.objects)):
+    if any(map(point_data.is_cloud, context.view_layer.objects)):
         self.layout.separator()
         self.layout.operator(PATINA_OT_set_up.bl_idname)
 

@@ -11,15 +11,15 @@ from bpy.props import EnumProperty, StringProperty
 from bpy.types import Context, Event, Object, Operator
 from bpy_extras.io_utils import ImportHelper
 
-from .. import native, styles, sync, thumbnails
+from .. import native, point_data, styles, sync, thumbnails
 
 
 def _points(context: Context) -> Object | None:
     """The object whose look a style takes: the active one, else the first with points."""
     active = context.view_layer.objects.active
-    if active and styles.is_cloud(active):
+    if active and point_data.is_cloud(active):
         return active
-    return next((obj for obj in context.view_layer.objects if styles.is_cloud(obj)), None)
+    return next((obj for obj in context.view_layer.objects if point_data.is_cloud(obj)), None)
 
 
 def _picture(context: Context, path: Path, of_scene: bool) -> str:

@@ -245,9 +245,6 @@ class Stream:
             self._process.stdin.flush()
 
 
-_python = programs.python
-
-
 def _finish(process: subprocess.Popen, folder: tempfile.TemporaryDirectory) -> None:
     with contextlib.suppress(OSError):
         process.stdin.close()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from .. import pace, versions, viewport
+from .. import pace, point_data, versions, viewport
 from ..engine import PatinaRenderEngine
 from ..operators import set_up
 from ..sync.analyzing import ANALYSES
@@ -37,7 +37,7 @@ class PATINA_PT_sidebar_set_up(Panel):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return context.engine != PatinaRenderEngine.bl_idname and any(map(set_up.is_points, context.view_layer.objects))
+        return context.engine != PatinaRenderEngine.bl_idname and any(map(point_data.is_cloud, context.view_layer.objects))
 
     def draw(self, context: Context) -> None:
         self.layout.operator(set_up.PATINA_OT_set_up.bl_idname, icon='RESTRICT_RENDER_OFF')

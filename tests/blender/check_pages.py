@@ -15,7 +15,7 @@ from check_copc import in_a_hurry, made, open_address, see, server, stream_of
 from check_ept import equal, shown, tiles
 from check_preferences import enabled
 from harness import SCRATCH, check, new_scene, render, reports
-from patina import preferences, streaming
+from patina import preferences, programs
 from patina.operators import preferences as operators
 from patina.streaming import shelf
 from patina.sync import addresses, cache, clouds
@@ -292,7 +292,7 @@ print(found)
 def test_two_at_once():
     shutil.rmtree(FOLDER, ignore_errors=True)
     own = str(Path(shelf.__file__).parent)
-    both = [subprocess.Popen([streaming._python(), "-I", "-c", _WORK, own, str(FOLDER), str(seed)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    both = [subprocess.Popen([programs.python(), "-I", "-c", _WORK, own, str(FOLDER), str(seed)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                              text=True) for seed in (1, 2)]
     for one in both:
         said, wrong = one.communicate(timeout=60)

@@ -10,7 +10,7 @@ from check_copc import import_copc, in_a_hurry, made, open_address
 from check_formats import with_laspy
 from harness import check
 from mathutils import Quaternion
-from patina import streaming, viewport
+from patina import programs, viewport
 from patina.sync import clouds
 from window import area, setup, shown, view
 
@@ -58,7 +58,7 @@ def test_copc_from_a_slow_server():
     with_laspy()
     path, _, _ = made("slow-window.copc.laz", 60000)
     clouds.CACHE.clear()
-    server = subprocess.Popen([streaming._python(), str(Path(__file__).with_name("range_server.py")), str(path), "slower"],
+    server = subprocess.Popen([programs.python(), str(Path(__file__).with_name("range_server.py")), str(path), "slower"],
                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     try:
         address = f"http://127.0.0.1:{int(server.stdout.readline())}/{path.name}"
@@ -99,7 +99,7 @@ def test_copc_of_a_server_that_goes_away():
     with_laspy()
     path, _, _ = made("gone-window.copc.laz", 60000)
     clouds.CACHE.clear()
-    server = subprocess.Popen([streaming._python(), str(Path(__file__).with_name("range_server.py")), str(path), "slower"],
+    server = subprocess.Popen([programs.python(), str(Path(__file__).with_name("range_server.py")), str(path), "slower"],
                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     try:
         address = f"http://127.0.0.1:{int(server.stdout.readline())}/{path.name}"
