@@ -13,11 +13,11 @@ import struct
 import sys
 import tempfile
 import time
-import traceback
 import types
 from pathlib import Path
 
 import numpy as np
+from runner import Skip, run_tests
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared/data"
@@ -29,10 +29,6 @@ las, e57, pcd, library, reading, unpacking, readers, native, e57_xml = (importli
     "unpacking.e57_xml"))
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-hostile-"))
 READERS = {".las": las, ".laz": las, ".e57": e57, ".pcd": pcd}
-
-
-class Skip(Exception):
-    pass
 
 
 def needs(*names):
@@ -417,30 +413,5 @@ def test_e57_mutations():
     assert len(read(written("good.e57", good)).positions) == 100
 
 
-def main():
-    passed = failed = skipped = 0
-    for name, test in list(globals().items()):
-        if not name.startswith("test_") or sys.argv[1:] and not any(word in name for word in sys.argv[1:]):
-            continue
-        start = time.perf_counter()
-        try:
-            test()
-        except Skip as reason:
-            skipped += 1
-            print(f"skip {name}: {reason}", flush=True)
-        except Exception as error:
-            failed += 1
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            print(f"FAIL {name}: {type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})", flush=True)
-        else:
-            passed += 1
-            print(f"ok {name} ({time.perf_counter() - start:.2f} s)", flush=True)
-    __import__("shutil").rmtree(SCRATCH, ignore_errors=True)
-    print(f"{passed} passed, {failed} failed, {skipped} skipped")
-    return 1 if failed or not passed else 0
-
-
 if __name__ == "__main__":
-    code = main()
-    sys.stdout.flush()
-    os._exit(code)
+    run_tests(globals(), SCRATCH)

@@ -18,13 +18,13 @@ import sys
 import tempfile
 import threading
 import time
-import traceback
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from unittest import mock
 
 import numpy as np
 import test_hostile
+from runner import Skip, run_tests
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "addon/streaming"), str(ROOT / "addon/unpacking"), str(ROOT / "tests/blender")]
@@ -36,7 +36,6 @@ import source  # noqa: E402
 streaming = importlib.import_module("patina.streaming")
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-servers-"))
 DATA = bytes(range(200)) * 5
-Skip = test_hostile.Skip
 IN_A_HURRY = {"timeout": 1.0, "wait": 0.01}
 
 # ---- a server
@@ -415,25 +414,4 @@ def test_cancel():
 
 
 if __name__ == "__main__":
-    passed = failed = skipped = 0
-    for name, test in list(globals().items()):
-        if not name.startswith("test_") or not callable(test) or sys.argv[1:] and not any(word in name for word in sys.argv[1:]):
-            continue
-        start = time.perf_counter()
-        try:
-            test()
-        except Skip as reason:
-            skipped += 1
-            print(f"skip {name}: {reason}", flush=True)
-        except Exception as error:
-            failed += 1
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            print(f"FAIL {name}: {type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})", flush=True)
-        else:
-            passed += 1
-            print(f"ok {name} ({time.perf_counter() - start:.2f} s)", flush=True)
-    shutil.rmtree(SCRATCH, ignore_errors=True)
-    shutil.rmtree(test_hostile.SCRATCH, ignore_errors=True)
-    print(f"{passed} passed, {failed} failed, {skipped} skipped")
-    sys.stdout.flush()
-    os._exit(1 if failed or not passed else 0)
+    run_tests(globals(), SCRATCH, test_hostile.SCRATCH)
