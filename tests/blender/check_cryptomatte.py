@@ -5,7 +5,7 @@ import json
 
 import bpy
 import numpy as np
-from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, render, sphere
+from harness import SCRATCH, Skip, add_points, check, check_close, compositor, end_compositor, new_scene, render, sphere
 from patina import cryptomatte
 from patina import render as drawing
 
@@ -197,15 +197,7 @@ def matte(path, name):
     """What the compositor's node takes out of a file by an object's name."""
     scene = bpy.context.scene
     image = bpy.data.images.load(str(path))
-    if hasattr(scene, "compositing_node_group"):
-        tree = scene.compositing_node_group = bpy.data.node_groups.new("matte", 'CompositorNodeTree')
-        tree.interface.new_socket("Image", in_out='OUTPUT', socket_type='NodeSocketColor')
-        out = tree.nodes.new('NodeGroupOutput')
-    else:
-        scene.use_nodes = True
-        tree = scene.node_tree
-        tree.nodes.clear()
-        out = tree.nodes.new('CompositorNodeComposite')
+    tree, out = compositor(scene)
     node = tree.nodes.new('CompositorNodeCryptomatteV2')
     node.source, node.image = 'IMAGE', image
     node.layer_name, node.matte_id = "ViewLayer.CryptoObject", name
@@ -217,10 +209,7 @@ def matte(path, name):
     settings.file_format, settings.color_mode, settings.color_depth = 'OPEN_EXR', 'RGB', '32'
     scene.render.filepath = str(SCRATCH / f"matte-{path.stem}-{name}")
     bpy.ops.render.render(write_still=True)
-    if hasattr(scene, "compositing_node_group"):
-        scene.compositing_node_group = None
-    else:
-        scene.use_nodes = False
+    end_compositor(scene)
     written = bpy.data.images.load(str(next(SCRATCH.glob(f"matte-{path.stem}-{name}*.exr"))))
     pixels = np.empty(SIZE * SIZE * 4, np.float32)
     written.pixels.foreach_get(pixels)

@@ -190,6 +190,24 @@ def points_of(obj):
 # ---- pictures ------------------------------------------------------------------------------------------------
 
 
+def compositor(scene):
+    """The tree of a new compositor, and its output node. Blender 5 has node groups for it, older versions the scene's own tree."""
+    if hasattr(scene, "compositing_node_group"):
+        tree = scene.compositing_node_group = bpy.data.node_groups.new("compositor", 'CompositorNodeTree')
+        tree.interface.new_socket("Image", in_out='OUTPUT', socket_type='NodeSocketColor')
+        return tree, tree.nodes.new('NodeGroupOutput')
+    scene.use_nodes = True
+    scene.node_tree.nodes.clear()
+    return scene.node_tree, scene.node_tree.nodes.new('CompositorNodeComposite')
+
+
+def end_compositor(scene):
+    if hasattr(scene, "compositing_node_group"):
+        scene.compositing_node_group = None
+    else:
+        scene.use_nodes = False
+
+
 def render():
     """F12 in the background. The passes of the first view layer as Blender holds them; {} when none were written."""
     pictures = render_layers()

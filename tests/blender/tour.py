@@ -73,17 +73,9 @@ def render(name):
 
 
 def invert(scene):
-    """A compositor that inverts the image: Blender 5 has node groups for it, older versions the scene's tree."""
-    if hasattr(scene, "compositing_node_group"):
-        tree = bpy.data.node_groups.new("invert", 'CompositorNodeTree')
-        scene.compositing_node_group = tree
-        tree.interface.new_socket("Image", in_out='OUTPUT', socket_type='NodeSocketColor')
-        out = tree.nodes.new('NodeGroupOutput')
-    else:
-        scene.use_nodes = True
-        tree = scene.node_tree
-        tree.nodes.clear()
-        out = tree.nodes.new('CompositorNodeComposite')
+    """A compositor that inverts the image."""
+    from harness import compositor
+    tree, out = compositor(scene)
     layers, node = tree.nodes.new('CompositorNodeRLayers'), tree.nodes.new('CompositorNodeInvert')
     tree.links.new(layers.outputs["Image"], node.inputs["Color"])
     tree.links.new(node.outputs[0], out.inputs[0])
@@ -91,6 +83,7 @@ def invert(scene):
 
 def tour():
     """Yields what it waits for: a function that says whether it has come."""
+    from harness import end_compositor
     from window import invoke_import, whole_window
     in_view(bpy.ops.wm.read_homefile, use_factory_startup=True, use_empty=False, app_template="", load_ui=False)
     yield pause()
@@ -153,10 +146,7 @@ def tour():
     scene.render.use_multiview = False
     invert(scene)
     render("14_compositor")
-    if hasattr(scene, "compositing_node_group"):
-        scene.compositing_node_group = None
-    else:
-        scene.use_nodes = False
+    end_compositor(scene)
     path = os.path.join(os.environ["PATINA_SCREENSHOTS"], "saved.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     in_view(bpy.ops.wm.open_mainfile, filepath=path, load_ui=False)
