@@ -22,7 +22,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from mathutils import Color
 
-from . import backdrop, cryptomatte, dots, graphics, mattes, native, overlays, pace, render, sky, streaming, sync
+from . import backdrop, cryptomatte, dots, graphics, mattes, native, overlays, pace, painting, render, sky, streaming, sync
 from .jobs import Pause, Steps
 from .native.points import highlight
 from .sync import analysis, edits
@@ -296,7 +296,8 @@ class Viewport:
             self._drawn = (self.shown, _upload(self.shown), self._drawn[2] if same else None)
         hides = shows_overlays and (self.shown.hiding is not None or self._chosen is not None)
         if hides and self._drawn[2] is None:
-            self._drawn = (*self._drawn[:2], graphics.texture(_covering(self.shown.depth if self.shown.hiding is None else self.shown.hiding), 'R32F'))
+            depth = self.shown.depth if self.shown.hiding is None else self.shown.hiding
+            self._drawn = (*self._drawn[:2], graphics.texture(painting.covering(depth), 'R32F'))
         shown, color, _ = self._drawn
         corners = [2.0 * share - 1.0 for share in shown.place]
         gpu.state.depth_test_set('NONE')
@@ -305,7 +306,7 @@ class Viewport:
         if shown.behind:
             self._sky.draw(shown.behind, shown.wish.view.camera, shown.place)
             gpu.state.blend_set('ALPHA_PREMULT')
-        _fill_rectangle(corners, 'EXACT' if shown.wish.level.shrink == 1 else 'SMOOTH', color)
+        painting.fill_rectangle(corners, 'EXACT' if shown.wish.level.shrink == 1 else 'SMOOTH', color)
         gpu.state.blend_set('NONE')
         if not hides:
             return
@@ -321,7 +322,7 @@ class Viewport:
             gpu.state.color_mask_set(False, False, False, False)
         gpu.state.depth_test_set('LESS_EQUAL')
         gpu.state.depth_mask_set(kind == 'DEPTH')
-        _fill_rectangle([2.0 * share - 1.0 for share in shown.place], kind, depth, **self._depths(context, HIDDEN))
+        painting.fill_rectangle([2.0 * share - 1.0 for share in shown.place], kind, depth, **self._depths(context, HIDDEN))
         gpu.state.color_mask_set(True, True, True, True)
         gpu.state.depth_test_set('NONE')
         gpu.state.depth_mask_set(False)
@@ -351,7 +352,7 @@ class Viewport:
     def _draw_chosen(self, context: bpy.types.Context) -> None:
         """Vertices that are selected in Edit Mode, on the side that is seen."""
         theme, scale = context.preferences.themes[0].view_3d, context.preferences.system.ui_scale
-        shader = _shader('CHOSEN')
+        shader = painting.shader('CHOSEN')
         if self._chosen_batch is None:
             self._chosen_batch = batch_for_shader(shader, 'POINTS', {"pos": self._chosen})
         x0, y0, x1, y1 = self._drawn[0].place
@@ -607,7 +608,6 @@ _VIEWPORTS: set[Viewport] = set()
 # Those with something to do; the first one works. One at a time: frames of a device take turns anyway, and clouds may
 # only get new colours while no picture of them is drawn.
 _TURNS: deque[Viewport] = deque()
-_compiled = graphics.Shaders()  # by what they draw
 
 
 def of_area(area: bpy.types.Area) -> Viewport | None:
@@ -628,7 +628,7 @@ def close_all() -> None:
         viewport.close()
     ANALYSES.clear()
     CHECKS.clear()
-    _compiled.forget()
+    painting.forget()
     sky.forget()
     sync.world.forget()
 
@@ -679,145 +679,3 @@ def _redraw(area_pointer: int, region_pointer: int, panels: bool) -> bool:
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:
     return graphics.texture(shown.color, 'RGBA16F')  # as it is: what is too bright is cut in the shader
-
-
-def _covering(depth: np.ndarray) -> np.ndarray:
-    """The nearest of 5 x 5 pixels, for all pixels. Here and not in the shader: a GPU in software takes ten times as long."""
-    height, width = depth.shape[:2]
-    wide = np.pad(depth[..., 0], 2, mode='edge')
-    for axis, size in ((0, height), (1, width)):
-        def shifted(values: np.ndarray, by: int, length: int, axis: int = axis) -> np.ndarray:
-            return values[by:by + length] if axis == 0 else values[:, by:by + length]
-
-        two = np.minimum(shifted(wide, 0, size + 3), shifted(wide, 1, size + 3))
-        four = np.minimum(shifted(two, 0, size + 1), shifted(two, 2, size + 1))
-        wide = np.minimum(shifted(four, 0, size), shifted(four, 1, size))
-    return wide[..., None]
-
-
-_VERTEX = """
-#if defined(CHOSEN)
-void main()
-{
-    gl_Position = transform * vec4(pos, 1.0);
-    gl_PointSize = offset.w;
-    vec2 at = (gl_Position.xy / gl_Position.w * 0.5 + 0.5 - region.xy) / region.zw;
-    ivec2 size = textureSize(picture, 0);
-    bool within = all(greaterThanEqual(at, vec2(0.0))) && all(lessThan(at, vec2(1.0)));
-    float far = within ? texelFetch(picture, min(ivec2(at * vec2(size)), size - 1), 0).r : 1e30;
-    if (0.5 * gl_Position.z / gl_Position.w + 0.5 > depth_of(far))
-        gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
-}
-#else
-void main()
-{
-    place = uv;
-    gl_Position = vec4(pos, 0.0, 1.0);
-}
-#endif
-"""
-
-# The depth of Blender's projection that belongs to a linear z.
-_DEPTH = """
-#if defined(CHOSEN)
-#define cover offset.x
-#define rounding offset.y
-#define away offset.z
-#endif
-#if !defined(EXACT) && !defined(SMOOTH)
-float depth_of(float far)
-{
-    float z = far - cover * (projection.w > 0.5 ? 1.0 : far);
-    float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z) : projection.y / z - projection.x;
-    float steps = rounding * (projection.w > 0.5 ? 1.0 : 1.0 + away / max(far, 1e-6));
-    return far < 1e29 ? clamp(0.5 * ndc + 0.5 - steps, 0.0, 1.0) : 1.0;
-}
-#endif
-"""
-
-# One program for each thing to draw: a GPU in software executes both sides of every branch, and looks at depths for each
-# program that may write one.
-_FRAGMENT = """
-const vec4 largest = vec4(65000.0); // Blender's half floats end at 65504; what overflows turns the viewport black
-
-#if !defined(CHOSEN)
-vec4 exact()
-{
-    ivec2 size = textureSize(picture, 0);
-    return texelFetch(picture, min(ivec2(place * vec2(size)), size - 1), 0);
-}
-#endif
-
-void main()
-{
-#if defined(CHOSEN)
-    vec2 off = gl_PointCoord - 0.5;
-    if (dot(off, off) > 0.25)
-        discard;
-    float code = abs(projection.w) - 1.0;
-    color = vec4(mod(code, 256.0), mod(floor(code / 256.0), 256.0), floor(code / 65536.0), 255.0) / 255.0;
-#elif defined(DEPTH) || defined(ERASE)
-    float far = exact().r;
-#if defined(ERASE)
-    if (far >= 1e29)
-        discard;
-#endif
-    gl_FragDepth = depth_of(far);
-    color = vec4(0.0);
-#elif defined(EXACT)
-    color = min(exact(), largest);
-#else
-    color = min(texture(picture, place), largest);
-#endif
-}
-"""
-
-
-def _fill_rectangle(corners: list[float], kind: str, texture: gpu.types.GPUTexture,
-                    **uniforms: float | tuple[float, ...]) -> None:
-    """Draws a texture over x0, y0, x1, y1 of -1..1. kind: EXACT, texel by texel; SMOOTH, between them; DEPTH, linear z as
-    depths of Blender's projection, uniforms of which are its third row, the near plane and whether it is orthographic; ERASE, nothing
-    at all where something is, at that depth.
-    Overlays hide behind a depth two pixels wider than the surface and `cover` nearer: Blender draws the vertices of our points as dots
-    over every engine's picture, and these lie just behind it. `rounding` moves it further, in shares of the whole depth, for Blender's vertices are rounded before they
-    are projected: the more, the farther the eye is from the world's middle, `away`, measured by the distance seen."""
-    shader = _shader(kind)
-    x0, y0, x1, y1 = corners
-    batch = batch_for_shader(shader, 'TRI_STRIP', {"pos": ((x0, y0), (x1, y0), (x0, y1), (x1, y1)),
-                                                   "uv": ((0, 0), (1, 0), (0, 1), (1, 1))})
-    shader.bind()
-    shader.uniform_sampler("picture", texture)
-    for name, value in uniforms.items():
-        shader.uniform_float(name, value)
-    batch.draw(shader)
-
-
-def _shader(kind: str) -> gpu.types.GPUShader:
-    return _compiled.get(kind, lambda: _create(kind))
-
-
-def _create(kind: str) -> gpu.types.GPUShader:
-    info = gpu.types.GPUShaderCreateInfo()
-    info.define(kind)
-    if kind in {'DEPTH', 'ERASE', 'CHOSEN'}:
-        info.push_constant('VEC4', "projection")
-        for name in ("cover", "rounding", "away") if kind != 'CHOSEN' else ():
-            info.push_constant('FLOAT', name)
-        if hasattr(info, "depth_write") and kind != 'CHOSEN':
-            info.depth_write('ANY')
-    info.sampler(0, 'FLOAT_2D', "picture")
-    if kind == 'CHOSEN':
-        info.push_constant('MAT4', "transform")  # with the others below the 128 bytes that all devices allow
-        for name in ("offset", "region"):
-            info.push_constant('VEC4', name)
-        info.vertex_in(0, 'VEC3', "pos")
-    else:
-        interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")
-        interface.smooth('VEC2', "place")
-        info.vertex_in(0, 'VEC2', "pos")
-        info.vertex_in(1, 'VEC2', "uv")
-        info.vertex_out(interface)
-    info.fragment_out(0, 'VEC4', "color")
-    info.vertex_source(_DEPTH + _VERTEX if kind == 'CHOSEN' else _VERTEX)
-    info.fragment_source(_FRAGMENT if kind == 'CHOSEN' else _DEPTH + _FRAGMENT)
-    return gpu.shader.create_from_info(info)

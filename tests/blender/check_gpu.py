@@ -9,7 +9,7 @@ import gpu
 import numpy as np
 from harness import Skip, check, check_close
 from mathutils import Matrix
-from patina import graphics, sky, viewport
+from patina import graphics, painting, sky
 from patina.sync import world_image
 from patina.sync.world_nodes import Picture
 
@@ -59,7 +59,7 @@ def test_gpu_pictures():
     """Texel by texel, over the part that it is of; what half floats cannot hold is cut; nothing is written into depths."""
     picture = np.random.default_rng(3).uniform(0, 2, (HEIGHT // 2, WIDTH // 2, 4)).astype(np.float32)
     picture[0, 0] = 1e6
-    color, depth = drawn_by(lambda: viewport._fill_rectangle([-1.0, -1.0, 0.0, 0.0], 'EXACT', graphics.texture(picture, 'RGBA16F')))
+    color, depth = drawn_by(lambda: painting.fill_rectangle([-1.0, -1.0, 0.0, 0.0], 'EXACT', graphics.texture(picture, 'RGBA16F')))
     check_close(color[:HEIGHT // 2, :WIDTH // 2], np.minimum(picture, 65000.0).astype(np.float16), 2e-3, "the lower left quarter")
     check(not color[HEIGHT // 2:].any() and not color[:, WIDTH // 2:].any(), "and nothing else")
     check((depth == 1).all(), "depths stay")
@@ -69,7 +69,7 @@ def test_gpu_stretched():
     """A coarser picture is drawn between its pixels."""
     ramp = np.zeros((3, 4, 4), np.float32)
     ramp[..., 0], ramp[..., 1] = np.arange(4), np.arange(3)[:, None]
-    color, _ = drawn_by(lambda: viewport._fill_rectangle([-1.0, -1.0, 1.0, 1.0], 'SMOOTH', graphics.texture(ramp, 'RGBA16F')))
+    color, _ = drawn_by(lambda: painting.fill_rectangle([-1.0, -1.0, 1.0, 1.0], 'SMOOTH', graphics.texture(ramp, 'RGBA16F')))
     across, up = np.clip((np.arange(WIDTH) + 0.5) / WIDTH * 4 - 0.5, 0, 3), np.clip((np.arange(HEIGHT) + 0.5) / HEIGHT * 3 - 0.5, 0, 2)
     check_close(color[..., 0], np.broadcast_to(across, (HEIGHT, WIDTH)), 0.02, "from left to right")
     check_close(color[..., 1], np.broadcast_to(up[:, None], (HEIGHT, WIDTH)), 0.02, "from the bottom to the top")
@@ -87,7 +87,7 @@ def test_gpu_depths():
             gpu.state.color_mask_set(False, False, False, False)
             gpu.state.depth_test_set('LESS_EQUAL')
             gpu.state.depth_mask_set(True)
-            viewport._fill_rectangle([-1.0, -1.0, 1.0, 1.0], 'DEPTH', graphics.texture(far, 'R32F'), cover=0.0, rounding=0.0, away=0.0,
+            painting.fill_rectangle([-1.0, -1.0, 1.0, 1.0], 'DEPTH', graphics.texture(far, 'R32F'), cover=0.0, rounding=0.0, away=0.0,
                                      projection=row)
         color, depth = drawn_by(draw)
         wanted = 0.5 + 0.5 * shown(far.astype(np.float64), *row[:2])

@@ -16,7 +16,7 @@ from check_import import import_ply as import_points
 from check_linked import dense
 from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, patina, render, sphere
 from mathutils import Quaternion
-from patina import graphics, histogram, pace, viewport
+from patina import graphics, histogram, pace, painting, viewport
 from patina.importers import las
 from patina.sync.analyzing import ANALYSES
 from window import area, invoke_import, newer, screenshot, settled, setup, shown, view, window_region
@@ -349,7 +349,7 @@ def test_graphics_that_lack_something():
         tried.append(info)
         raise Exception("Shader Compile Error, see console for more details")
 
-    viewport._compiled.forget()
+    painting.forget()
     gpu.shader.create_from_info = failing
     try:
         for turn in (0.5, 0.6, 0.7):
@@ -361,7 +361,7 @@ def test_graphics_that_lack_something():
         check(render()["Combined"].any(), "F12 shows nothing")
     finally:
         gpu.shader.create_from_info = create
-        viewport._compiled.forget()
+        painting.forget()
     before = found.pictures
     view().view_rotation = Quaternion((0, 1, 0), 0.8)
     yield newer(before)
