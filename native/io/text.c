@@ -17,88 +17,20 @@
 //    row's end: it numbers the points and is left out; where that is not so, what was taken as x, y and z is told.
 #include "base/color.h"
 #include "base/progress.h"
-#include "cells.h"
-#include "file.h"
 #include "number.h"
-#include "roles.h"
+#include "text.h"
 #include "base/words.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_COLUMNS = 32, SAMPLES = 1000, POLL_LINES = 8192, WORD_SHARE = 10 };
-
-// The words that one column holds among its numbers.
-struct words {
-    uint64_t count, first_line;
-    char first[48];
-};
-
-struct text {
-    const struct pt_input *input;
-    struct patina_file *file;
-    struct pt_cells cells;
-    const uint8_t *at, *end;
-    uint64_t line;     // of `at`, from 1
-    uint32_t breaks;   // line ends within the quotes of the line before `at`
-    uint32_t columns;  // numbers of a row
-    uint32_t width;    // words of a row, those that are left out too
-    uint32_t left_out; // columns of words, or that number the points: a bit each
-    uint32_t needed;   // columns that must hold none: what their names say is no attribute, or all but the first row's words
-    uint64_t odd_line; // the first row that has not as many words as the first, 0: all have
-    uint32_t odd_width;
-    bool words; // there were some, of any kind
-    struct words found[MOST_COLUMNS];
-    uint64_t filled[MOST_COLUMNS]; // numbers of a column
-    uint32_t name_count;
-    char names[MOST_COLUMNS][NAME_SIZE];
-    bool named, ptx, pts;
-    enum role roles[MOST_COLUMNS];
-    bool float_colors; // 0..1
-    double maximum;    // of integer colours: 255 or 65535
-    double *staged;
-    float **attributes; // a column each, in the order of the columns
-    // Of a PTX:
-    double announced;      // of a PTS: points, by the lines with a single number
-    uint64_t announced_at; // the first of these lines
-    uint32_t most;         // columns or rows of a grid, or scans
-    uint32_t scans;        // that were begun
-    uint32_t room;         // of file->scans
-    void *places[3];       // each point's scan, column and row, from 0: uint16, or uint32 where `most` does not fit
-};
+enum { SAMPLES = 1000, POLL_LINES = 8192, WORD_SHARE = 10 };
 
 // ---- lines -----------------------------------------------------------------------------------------------------------
 
-// Comes to the next line that holds something; false at the end.
-static bool find_line(struct text *t)
-{
-    t->line += t->breaks;
-    t->breaks = 0;
-    for (;;) {
-        while (t->at < t->end && (pt_cells_skips(t->cells.parting, *t->at) || pt_is_line_end(*t->at))) {
-            t->line += *t->at == '\n' || (*t->at == '\r' && (t->at + 1 == t->end || t->at[1] != '\n'));
-            t->at++;
-        }
-        if (t->at == t->end || !pt_is_comment(t->at, t->end))
-            return t->at < t->end;
-        while (t->at < t->end && !pt_is_line_end(*t->at))
-            t->at++;
-    }
-}
-
-// The words of the line at t->at as numbers; t->at comes to its end.
-static struct pt_line read_line(struct text *t, double values[MOST_COLUMNS])
-{
-    struct pt_line line;
-    t->at = pt_cells_read(&t->cells, t->at, t->end, values, MOST_COLUMNS, &line);
-    t->breaks = line.breaks;
-    return line;
-}
-
-static void leave_out(const struct text *t, double values[MOST_COLUMNS])
+static void leave_out(const struct pt_text *t, double values[MOST_COLUMNS])
 {
     uint32_t kept = 0;
     for (uint32_t c = 0; t->left_out && c < MOST_COLUMNS; c++)
@@ -106,14 +38,14 @@ static void leave_out(const struct text *t, double values[MOST_COLUMNS])
             values[kept++] = values[c];
 }
 
-static int fail_at(const struct text *t, const char *what)
+static int fail_at(const struct pt_text *t, const char *what)
 {
     return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: line %llu: %s", t->input->name, (unsigned long long)t->line, what);
 }
 
 // ---- what the columns are ----------------------------------------------------------------------------------------------
 
-static void read_names(struct text *t, const uint8_t *at)
+static void read_names(struct pt_text *t, const uint8_t *at)
 {
     char name[NAME_SIZE];
     t->named = true;
@@ -123,9 +55,9 @@ static void read_names(struct text *t, const uint8_t *at)
     t->name_count = t->name_count < MOST_COLUMNS ? t->name_count : MOST_COLUMNS;
 }
 
-static bool has(const struct text *t, enum role first) { return pt_roles_have(t->roles, t->columns, first); }
+static bool has(const struct pt_text *t, enum role first) { return pt_roles_have(t->roles, t->columns, first); }
 
-static void set_three(struct text *t, uint32_t column, enum role first)
+static void set_three(struct pt_text *t, uint32_t column, enum role first)
 {
     for (uint32_t k = 0; k < 3; k++)
         t->roles[column + k] = first + k;
@@ -144,7 +76,7 @@ static bool are_normals(double (*rows)[MOST_COLUMNS], uint32_t count, uint32_t c
     return 10 * good >= 9 * finite && finite;
 }
 
-static void guess_roles(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t count)
+static void guess_roles(struct pt_text *t, double (*rows)[MOST_COLUMNS], uint32_t count)
 {
     set_three(t, 0, X);
     if (t->columns == 7) {
@@ -162,7 +94,7 @@ static void guess_roles(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t c
 }
 
 // Colours that stay at or below 1 with parts of it are shares of 1; above 255 they have 16 bits.
-static void guess_colors(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t count)
+static void guess_colors(struct pt_text *t, double (*rows)[MOST_COLUMNS], uint32_t count)
 {
     double most = 0.0;
     bool whole = true;
@@ -176,118 +108,9 @@ static void guess_colors(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t 
     t->maximum = t->float_colors ? 1.0 : most > 255.0 ? 65535.0 : 255.0;
 }
 
-// ---- the scans of a PTX --------------------------------------------------------------------------------------------------
-
-struct scan {
-    uint64_t left; // points still to come
-    uint64_t cell; // behind the last one: column by column
-    uint32_t columns, rows;
-    bool bad;          // its matrix is none of a pose: its points are left out
-    uint64_t surplus;  // lines behind the grid's that are no header
-    double matrix[16]; // as in the file: rows of the transposed
-};
-
-// Reads "columns, rows, position, three axes, four rows of a matrix". Returns how many of the ten lines are that; size: the two numbers
-// of the first two. Ten: the caller checks the numbers.
-static int read_head(struct text *t, struct scan *scan, double size[2], uint64_t *line_of_head)
-{
-    double values[MOST_COLUMNS];
-    size[0] = size[1] = 0;
-    for (int i = 0; i < 10; i++) {
-        uint32_t wanted = i < 2 ? 1 : i < 6 ? 3 : 4;
-        if (!find_line(t))
-            return i;
-        *line_of_head = i ? *line_of_head : t->line;
-        struct pt_line line = read_line(t, values);
-        if (line.count != wanted || line.strange)
-            return i;
-        if (i < 2)
-            size[i] = values[0];
-        else if (i >= 6)
-            memcpy(scan->matrix + 4 * (i - 6), values, 4 * sizeof *values);
-    }
-    return 10;
-}
-
-// Whether there is a scan's head. An error where it has a head's lines, but numbers of columns and rows that no grid has.
-static int read_scan(struct text *t, struct scan *scan, bool *found)
-{
-    double size[2];
-    uint64_t line = t->line;
-    *found = read_head(t, scan, size, &line) == 10;
-    if (!*found)
-        return PATINA_OK;
-    if (!(size[0] >= 0 && size[1] >= 0 && size[0] < 4294967295.0 && size[1] < 4294967295.0 &&
-          size[0] * size[1] < 4294967295.0 && size[0] == floor(size[0]) && size[1] == floor(size[1]))) {
-        return pt_fail(
-            NULL, PATINA_ERROR_FORMAT,
-            "%s: line %llu: scan %u announces a grid of %.10g columns and %.10g rows: whole numbers, with fewer than 2^32 "
-            "cells, are needed",
-            t->input->name, (unsigned long long)line, t->scans, size[0], size[1]);
-    }
-    scan->columns = (uint32_t)size[0];
-    scan->rows = (uint32_t)size[1];
-    scan->left = (uint64_t)scan->columns * scan->rows;
-    scan->cell = scan->surplus = 0;
-    const double *place = scan->matrix + 12;
-    scan->bad = !pt_turns(scan->matrix, 4) || !isfinite(place[0] + place[1] + place[2]);
-    return PATINA_OK;
-}
-
-// The same; where it is none, t->at stays.
-static int try_scan(struct text *t, struct scan *scan, bool *is_one)
-{
-    const uint8_t *at = t->at;
-    const uint64_t line = t->line;
-    const uint32_t breaks = t->breaks;
-    struct scan found = {0};
-    const int code = read_scan(t, &found, is_one);
-    if (code || *is_one) {
-        *scan = found;
-        return code;
-    }
-    t->at = at;
-    t->line = line;
-    t->breaks = breaks;
-    return PATINA_OK;
-}
-
-static int keep_scan(struct text *t, const struct scan *scan, uint64_t first)
-{
-    struct patina_file *file = t->file;
-    if (file->scan_count == t->room) {
-        uint32_t room = 2 * t->room + 8;
-        struct pt_scan *grown = realloc(file->scans, room * sizeof *grown);
-        if (!grown)
-            return PATINA_ERROR_MEMORY;
-        file->scans = grown;
-        t->room = room;
-    }
-    struct pt_scan *kept = &file->scans[file->scan_count++];
-    *kept = (struct pt_scan){.first = first, .columns = scan->columns, .rows = scan->rows, .nowhere = scan->bad};
-    for (int i = 0; i < 12; i++)
-        kept->pose[i] = scan->matrix[4 * (i % 4) + i / 4];
-    if (!scan->bad)
-        memcpy(kept->station, scan->matrix + 12, sizeof kept->station);
-    return PATINA_OK;
-}
-
-static void keep_places(struct text *t, const struct scan *scan, uint64_t i)
-{
-    uint64_t cell = scan->cell - 1;
-    const uint64_t values[3] = {t->file->scan_count - 1, cell / scan->rows, cell % scan->rows};
-    t->file->scans[t->file->scan_count - 1].count++;
-    for (int k = 0; k < 3; k++) {
-        if (t->most < UINT16_MAX)
-            ((uint16_t *)t->places[k])[i] = (uint16_t)values[k];
-        else
-            ((uint32_t *)t->places[k])[i] = (uint32_t)values[k];
-    }
-}
-
 // ---- rows ------------------------------------------------------------------------------------------------------------------
 
-static void place(const struct scan *scan, double p[3])
+static void place(const struct pt_text_scan *scan, double p[3])
 {
     double q[3];
     for (int k = 0; k < 3; k++)
@@ -295,7 +118,7 @@ static void place(const struct scan *scan, double p[3])
     memcpy(p, q, sizeof q);
 }
 
-static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
+static void store(struct pt_text *t, uint64_t i, const double values[MOST_COLUMNS])
 {
     struct patina_file *file = t->file;
     uint32_t attribute = 0;
@@ -321,7 +144,7 @@ static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
     }
 }
 
-static void call_column(const struct text *t, uint32_t c, char called[NAME_SIZE + 16])
+static void call_column(const struct pt_text *t, uint32_t c, char called[NAME_SIZE + 16])
 {
     if (c < t->name_count && t->names[c][0])
         snprintf(called, NAME_SIZE + 16, "column '%s'", t->names[c]);
@@ -329,7 +152,7 @@ static void call_column(const struct text *t, uint32_t c, char called[NAME_SIZE 
         snprintf(called, NAME_SIZE + 16, "column %u", c + 1);
 }
 
-static int refuse_word(const struct text *t, uint32_t column, const char *word)
+static int refuse_word(const struct pt_text *t, uint32_t column, const char *word)
 {
     char what[320], called[NAME_SIZE + 16];
     bool thousands = strchr(word, ',') && strspn(word, "+-0123456789.,") == strlen(word);
@@ -342,7 +165,7 @@ static int refuse_word(const struct text *t, uint32_t column, const char *word)
 }
 
 // Counts the words of the row at `at`, in these columns.
-static int meet_words(struct text *t, const uint8_t *at, uint32_t columns)
+static int meet_words(struct pt_text *t, const uint8_t *at, uint32_t columns)
 {
     char word[NAME_SIZE] = "";
     for (uint32_t c = 0; c < MOST_COLUMNS && (at = pt_cells_name(t->cells.parting, at, t->end, word, sizeof word)); c++) {
@@ -352,7 +175,7 @@ static int meet_words(struct text *t, const uint8_t *at, uint32_t columns)
             return refuse_word(t, c, word);
         if (pt_cells_says_empty(word))
             continue;
-        struct words *found = &t->found[c];
+        struct pt_text_words *found = &t->found[c];
         if (!found->count++) {
             found->first_line = t->line;
             snprintf(found->first, sizeof found->first, "%.40s", word);
@@ -361,7 +184,7 @@ static int meet_words(struct text *t, const uint8_t *at, uint32_t columns)
     return PATINA_OK;
 }
 
-static int fail_width(const struct text *t, const char *what, uint32_t width, uint32_t wanted)
+static int fail_width(const struct pt_text *t, const char *what, uint32_t width, uint32_t wanted)
 {
     char text[96];
     snprintf(text, sizeof text, "%u %s; %u were expected", width, what, wanted);
@@ -369,7 +192,7 @@ static int fail_width(const struct text *t, const char *what, uint32_t width, ui
 }
 
 // Before rows are stored: what a row has, against the first one.
-static int check_row(struct text *t, const uint8_t *at, struct pt_line line, const double values[MOST_COLUMNS])
+static int check_row(struct pt_text *t, const uint8_t *at, struct pt_line line, const double values[MOST_COLUMNS])
 {
     if (!t->width) {
         t->width = line.width;
@@ -389,7 +212,7 @@ static int check_row(struct text *t, const uint8_t *at, struct pt_line line, con
 }
 
 // Whether the line holds a single number, as a scan's header begins and no point does.
-static bool is_single(struct text *t)
+static bool is_single(struct pt_text *t)
 {
     const uint8_t *at = t->at;
     while (at<t->end && * at> ' ')
@@ -399,36 +222,13 @@ static bool is_single(struct text *t)
     return at == t->end || pt_is_line_end(*at);
 }
 
-// Where a scan's header is due, or comes too early. i: the first point behind it.
-static int next_scan(struct text *t, struct scan *scan, bool storing, uint64_t i)
-{
-    const struct scan before = *scan;
-    double values[MOST_COLUMNS];
-    bool is_one;
-    const int code = try_scan(t, scan, &is_one);
-    if (code)
-        return code;
-    if (!is_one) { // more lines than the grid has cells
-        scan->surplus++;
-        read_line(t, values);
-        return PATINA_OK;
-    }
-    if (storing && t->scans)
-        pt_file_end_scan(t->file, before.left, before.surplus);
-    t->scans++;
-    t->most = scan->columns > t->most ? scan->columns : t->most;
-    t->most = scan->rows > t->most ? scan->rows : t->most;
-    t->most = t->scans > t->most ? t->scans : t->most;
-    return storing ? keep_scan(t, scan, i) : PATINA_OK;
-}
-
 // Goes over all rows; stores them, or only counts them and keeps the first ones.
-static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], uint64_t *count)
+static int walk(struct pt_text *t, bool storing, double (*sample)[MOST_COLUMNS], uint64_t *count)
 {
-    struct scan scan = {0};
+    struct pt_text_scan scan = {0};
     uint64_t i = 0, polled = 0;
     t->scans = 0;
-    while (find_line(t)) {
+    while (pt_text_find_line(t)) {
         double values[MOST_COLUMNS] = {0};
         if (++polled % POLL_LINES == 0) {
             float half = 0.5f * (float)((double)(t->at - t->input->data) / (double)t->input->size);
@@ -437,13 +237,13 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
                 return pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: reading was cancelled", t->input->name);
         }
         if (t->ptx && (!scan.left || is_single(t))) {
-            int code = next_scan(t, &scan, storing, i);
+            int code = pt_text_next_scan(t, &scan, storing, i);
             if (code)
                 return code;
             continue;
         }
         const uint8_t *start = t->at;
-        struct pt_line line = read_line(t, values);
+        struct pt_line line = pt_text_read_line(t, values);
         if (t->pts && line.count == 1 && !line.strange) { // how many points follow
             if (!storing) {
                 t->announced += values[0];
@@ -474,7 +274,7 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
         if (storing) {
             store(t, i, values);
             if (t->ptx)
-                keep_places(t, &scan, i);
+                pt_text_keep_places(t, &scan, i);
         }
         i++;
     }
@@ -486,22 +286,15 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
     return PATINA_OK;
 }
 
-static void rewind_text(struct text *t, const uint8_t *body, uint64_t line)
-{
-    t->at = body;
-    t->line = line;
-    t->breaks = 0;
-}
-
 // ---- columns -----------------------------------------------------------------------------------------------------------------
 
-static int add_attribute(struct text *t, const char *name, uint32_t type, void **data)
+static int add_attribute(struct pt_text *t, const char *name, uint32_t type, void **data)
 {
     *data = malloc(t->file->count * pt_type_size(type) + 1);
     return *data ? pt_file_add_attribute(t->file, name, type, *data) : PATINA_ERROR_MEMORY;
 }
 
-static int make_places(struct text *t)
+static int make_places(struct pt_text *t)
 {
     static const char *const names[] = {"scan", "column", "row"};
     uint32_t type = t->most < UINT16_MAX ? PATINA_UINT16 : PATINA_UINT32;
@@ -511,7 +304,7 @@ static int make_places(struct text *t)
     return PATINA_OK;
 }
 
-static int make_columns(struct text *t)
+static int make_columns(struct pt_text *t)
 {
     struct patina_file *file = t->file;
     uint32_t attribute = 0;
@@ -551,18 +344,18 @@ static int make_columns(struct text *t)
 // ---- the whole -----------------------------------------------------------------------------------------------------------------
 
 // Whether there are names of x, y and z among the names.
-static bool names_points(const struct text *t)
+static bool names_points(const struct pt_text *t)
 {
-    struct text named = *t;
+    struct pt_text named = *t;
     named.columns = t->name_count;
     pt_roles_by_name(named.roles, named.names, named.columns);
     return has(&named, X);
 }
 
 // A bit for each of those that are no attributes.
-static uint32_t needed_columns(const struct text *t)
+static uint32_t needed_columns(const struct pt_text *t)
 {
-    struct text named = *t;
+    struct pt_text named = *t;
     uint32_t found = 0;
     named.columns = t->name_count;
     pt_roles_by_name(named.roles, named.names, named.columns);
@@ -571,7 +364,7 @@ static uint32_t needed_columns(const struct text *t)
     return found;
 }
 
-static int fail_names(const struct text *t)
+static int fail_names(const struct pt_text *t)
 {
     char names[128] = "";
     uint32_t c = 0;
@@ -582,29 +375,8 @@ static int fail_names(const struct text *t)
                    c < t->name_count ? ", ..." : "");
 }
 
-// A file that begins as a PTX does, but whose first head is none: its lines would become points. A PTS has one number before its points,
-// or several where there are none.
-static int refuse_broken_head(struct text *t, const uint8_t *first, uint64_t line)
-{
-    double size[2];
-    struct scan scan;
-    uint64_t head;
-    rewind_text(t, first, line);
-    const int lines = read_head(t, &scan, size, &head);
-    const uint64_t broken = t->line;
-    const bool ended = !find_line(t);
-    rewind_text(t, first, line);
-    if (lines < 2 || (lines == 2 && ended) || size[0] == 0)
-        return PATINA_OK;
-    return pt_fail(NULL, PATINA_ERROR_FORMAT,
-                   "%s: line %llu: the head of scan 0 is broken: behind its columns and rows, four lines of three numbers and "
-                   "four of four "
-                   "are needed",
-                   t->input->name, (unsigned long long)broken);
-}
-
 // Logs where a PTS announces another number of points than it holds.
-static void compare_announced(const struct text *t)
+static void compare_announced(const struct pt_text *t)
 {
     if (t->pts && t->announced_at && !(t->announced == (double)t->file->count))
         pt_log(PT_LOG_WARNING, "%s: line %llu announces %.15g points, the file holds %llu", t->input->name,
@@ -612,30 +384,30 @@ static void compare_announced(const struct text *t)
 }
 
 // Looks at the first lines: which of the formats this is, and where its rows begin.
-static int look(struct text *t, const uint8_t **body, uint64_t *line)
+static int look(struct pt_text *t, const uint8_t **body, uint64_t *line)
 {
     double values[MOST_COLUMNS];
-    struct scan scan;
+    struct pt_text_scan scan;
     const uint8_t *start = t->at;
     t->needed = ~UINT32_C(0);
-    if (!find_line(t))
+    if (!pt_text_find_line(t))
         return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: neither a PLY file nor lines of numbers: there is nothing in it",
                        t->input->name);
     while (t->at > start && !pt_is_line_end(t->at[-1]))
         t->at--; // a table's first cell may be empty
     const uint8_t *first = *body = t->at;
     *line = t->line;
-    const int code = read_scan(t, &scan, &t->ptx);
-    rewind_text(t, first, *line);
+    const int code = pt_text_read_scan(t, &scan, &t->ptx);
+    pt_text_rewind(t, first, *line);
     if (code || t->ptx)
         return code;
-    struct pt_line words = read_line(t, values);
+    struct pt_line words = pt_text_read_line(t, values);
     t->pts = words.count == 1 && !words.strange;
     if (t->pts)
-        return refuse_broken_head(t, first, *line);
+        return pt_text_refuse_broken_head(t, first, *line);
     t->cells.parting = pt_cells_look(first, t->end);
     t->at = first;
-    words = read_line(t, values);
+    words = pt_text_read_line(t, values);
     t->cells.commas = t->cells.points = 0;
     if (words.strange && words.strange < 3 && words.count >= words.strange + 3) {
         t->needed = ~words.strange_columns; // point names before the numbers, a code behind them
@@ -646,12 +418,12 @@ static int look(struct text *t, const uint8_t **body, uint64_t *line)
         if (!names_points(t))
             return fail_names(t);
         t->needed = needed_columns(t);
-        find_line(t);
+        pt_text_find_line(t);
         *body = t->at;
         *line = t->line;
         return PATINA_OK;
     }
-    rewind_text(t, first, *line);
+    pt_text_rewind(t, first, *line);
     return PATINA_OK;
 }
 
@@ -663,7 +435,7 @@ static bool always_empty(double (*sample)[MOST_COLUMNS], uint32_t count, uint32_
     return empty;
 }
 
-static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
+static int choose_roles(struct pt_text *t, double (*sample)[MOST_COLUMNS])
 {
     uint32_t count = t->file->count < SAMPLES ? (uint32_t)t->file->count : SAMPLES;
     if (t->columns < 3)
@@ -686,7 +458,7 @@ static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
 }
 
 // Whether the sampled rows number the points in their first column, before four columns of numbers and words at their end.
-static bool has_numbers_of_points(const struct text *t, double (*sample)[MOST_COLUMNS], uint32_t count)
+static bool has_numbers_of_points(const struct pt_text *t, double (*sample)[MOST_COLUMNS], uint32_t count)
 {
     uint32_t left_out = 0;
     for (uint32_t c = 0; c < t->columns; c++)
@@ -700,7 +472,7 @@ static bool has_numbers_of_points(const struct text *t, double (*sample)[MOST_CO
 }
 
 // Says which columns of the file, from 1, are taken for a place where nothing names them.
-static void tell_places(const struct text *t, bool numbered)
+static void tell_places(const struct pt_text *t, bool numbered)
 {
     uint32_t at[4] = {0}, found = 0;
     for (uint32_t c = 0; c < t->columns && found < 4; c++)
@@ -712,11 +484,11 @@ static void tell_places(const struct text *t, bool numbered)
 }
 
 // What becomes of columns with words: see the head.
-static int decide_words(struct text *t, double (*sample)[MOST_COLUMNS])
+static int decide_words(struct pt_text *t, double (*sample)[MOST_COLUMNS])
 {
     char called[NAME_SIZE + 16];
     for (uint32_t c = 0; c < MOST_COLUMNS; c++) {
-        const struct words *found = &t->found[c];
+        const struct pt_text_words *found = &t->found[c];
         if (!found->count)
             continue;
         call_column(t, c, called);
@@ -758,14 +530,14 @@ static int decide_words(struct text *t, double (*sample)[MOST_COLUMNS])
     return PATINA_OK;
 }
 
-static int read_all(struct text *t)
+static int read_all(struct pt_text *t)
 {
     double(*sample)[MOST_COLUMNS] = calloc(SAMPLES, sizeof *sample);
     const uint8_t *body = t->at;
     uint64_t line = 1, count;
     int code = sample ? look(t, &body, &line) : PATINA_ERROR_MEMORY;
     if (!code) {
-        rewind_text(t, body, line);
+        pt_text_rewind(t, body, line);
         code = walk(t, false, sample, &t->file->count);
     }
     if (!code) {
@@ -777,7 +549,7 @@ static int read_all(struct text *t)
         code = pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%s: %llu points, more than 2^32 - 2", t->input->name,
                        (unsigned long long)t->file->count);
     if (!code && t->file->count && !(code = choose_roles(t, sample)) && !(code = make_columns(t))) {
-        rewind_text(t, body, line);
+        pt_text_rewind(t, body, line);
         code = walk(t, true, NULL, &count);
     }
     free(sample);
@@ -787,9 +559,9 @@ static int read_all(struct text *t)
 }
 
 // Where the lines begin: behind a byte order mark, and behind a first line "sep=;" as Excel writes it.
-static struct text begin(const struct pt_input *input)
+static struct pt_text begin(const struct pt_input *input)
 {
-    struct text t = {.input = input, .at = input->data, .end = input->data + input->size, .line = 1};
+    struct pt_text t = {.input = input, .at = input->data, .end = input->data + input->size, .line = 1};
     if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
         t.at += 3;
     if (t.end - t.at > 6 && pt_same_start((const char *)t.at, "sep=", 4) && pt_is_line_end(t.at[5]))
@@ -806,7 +578,7 @@ int pt_text_read(struct patina_file *file, const struct pt_input *input)
 {
     if (is_utf16(input))
         return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: a text in UTF-16, which is not read; save it as CSV UTF-8", input->name);
-    struct text t = begin(input);
+    struct pt_text t = begin(input);
     t.file = file;
     int code = read_all(&t);
     free(t.attributes);
@@ -845,9 +617,9 @@ bool pt_text_is(const struct pt_input *input)
         return false;
     if (is_utf16(input))
         return true;
-    struct text t = begin(input);
+    struct pt_text t = begin(input);
     char word[NAME_SIZE];
-    if (!find_line(&t) || !pt_cells_name(PT_PARTED_LOOSELY, t.at, t.end, word, sizeof word))
+    if (!pt_text_find_line(&t) || !pt_cells_name(PT_PARTED_LOOSELY, t.at, t.end, word, sizeof word))
         return false;
     if ((word[0] && strchr("0123456789-+.", word[0])) || pt_same_start(word, "nan", 3) || pt_same_start(word, "inf", 3))
         return true;
