@@ -45,10 +45,10 @@ struct pt_text {
     double announced;      // points, by the lines with a single number
     uint64_t announced_at; // the first of these lines
     // Of a PTX:
-    uint32_t most;         // columns or rows of a grid, or scans
-    uint32_t scans;        // that were begun
-    uint32_t room;         // of file->scans
-    void *places[3];       // each point's scan, column and row, from 0: uint16, or uint32 where `most` does not fit
+    uint32_t most;   // columns or rows of a grid, or scans
+    uint32_t scans;  // that were begun
+    uint32_t room;   // of file->scans
+    void *places[3]; // each point's scan, column and row, from 0: uint16, or uint32 where `most` does not fit
 };
 
 // A scan of a PTX.

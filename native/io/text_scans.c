@@ -143,4 +143,3 @@ int pt_text_refuse_broken_head(struct pt_text *t, const uint8_t *first, uint64_t
                    "are needed",
                    t->input->name, (unsigned long long)broken);
 }
-
