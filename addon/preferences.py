@@ -49,45 +49,45 @@ class PatinaPreferences(AddonPreferences):
 
     cache_folder: StringProperty(
         name="Cache Folder", subtype='DIR_PATH',
-        description="Where linked clouds are kept, to open at once the next time. Empty: in Blender's folder of user data")
+        description="Folder of the caches of linked clouds, which open instantly the next time. Empty: Blender's user data folder")
     cache_limit: IntProperty(
         name="Cache Size", default=CACHE_GIGA, min=1, soft_max=1024, max=1 << 20,
-        description="Gigabytes that kept clouds may take; those not used for longest go first")
+        description="Largest size of the caches, in gigabytes. The least recently used ones are deleted first")
     keep_pages: EnumProperty(
         name="Keep Fetched Points", default='OFF',
-        description="Keep on this disk what pictures fetch of COPC files and EPT folders, as it came, so that it is fetched once",
+        description="Cache the downloaded parts of COPC and EPT clouds on this disk",
         items=(
-            ('OFF', "Off", "Each session fetches anew what it shows", 0),
-            ('ADDRESSES', "Of Addresses", "What comes from servers is kept", 1),
-            ('ALL', "Of Addresses and Files", "What is read of linked files as it is wanted, too: for slow shares", 2)))
+            ('OFF', "Off", "Download again in each session", 0),
+            ('ADDRESSES', "Of Addresses", "Cache what comes from servers", 1),
+            ('ALL', "Of Addresses and Files", "Also cache what is read from linked files, for slow network drives", 2)))
     pages_folder: StringProperty(
         name="Folder", subtype='DIR_PATH',
-        description="Where fetched points are kept. Empty: a folder among the caches")
+        description="Folder of downloaded points. Empty: a folder in the cache folder")
     pages_limit: IntProperty(
         name="Size", default=PAGES_GIGA, min=1, soft_max=1024, max=1 << 20,
-        description="Gigabytes that fetched points may take; those not used for longest go first")
+        description="Largest size of the downloaded points, in gigabytes. The least recently used ones are deleted first")
     device: EnumProperty(
-        name="Device", default='AUTO', description="What computes the pictures of scenes whose own device is Automatic",
+        name="Device", default='AUTO', description="Device for scenes whose own device is Automatic",
         items=(
-            ('AUTO', "Automatic", "The GPU where there is one, else the processor", 0),
-            ('CPU', "Processor", "The same pixels on every machine", 1),
+            ('AUTO', "Automatic", "The GPU if there is one, otherwise the processor", 0),
+            ('CPU', "Processor", "SIMD code on the processor. Gives the same pixels on each machine", 1),
             ('GL', "OpenGL", "OpenGL 4.3 compute shaders", 3)))
     threads: IntProperty(
         name="Threads", default=0, min=0, max=1024,
-        description="Processor threads of scenes that do not say how many")
-    use_threads: switch("threads", 4, "A fixed number of threads; else Blender's own setting holds")
+        description="Number of processor threads for scenes that do not set their own")
+    use_threads: switch("threads", 4, "Use a fixed number of threads. Disabled: Blender's own setting")
     memory_limit: IntProperty(
         name="Memory", default=0, min=0, soft_max=256, max=1 << 20, update=_use,
-        description="Gigabytes that a final picture's planes may take before it is made in tiles")
-    use_memory_limit: switch("memory_limit", 4, "A fixed number of gigabytes; else half of what is free", "Set Memory")
+        description="Memory for a final render, in gigabytes. Larger renders are split into tiles")
+    use_memory_limit: switch("memory_limit", 4, "Use a fixed limit. Disabled: half of the free memory", "Set Memory")
     cloud_limit: IntProperty(
         name="Linked Clouds", default=0, min=0, soft_max=256, max=1 << 20,
-        description="Gigabytes that a picture holds of linked clouds at a time; what is more is read in rounds, to the same picture")
-    use_cloud_limit: switch("cloud_limit", 4, "A fixed number of gigabytes; else a third of what is free", "Set Linked Clouds")
+        description="Memory for linked clouds, in gigabytes. Larger clouds are read in several rounds, with the same result")
+    use_cloud_limit: switch("cloud_limit", 4, "Use a fixed limit. Disabled: a third of the free memory", "Set Linked Clouds")
 
     online: BoolProperty(
         name="Allow Online Access", default=False,
-        description="Fetch points from addresses that you open. From Blender 4.2 on its own setting, under System, holds")
+        description="Allow downloads from addresses that you open. In Blender 4.2 and later, Blender's own setting under System applies")
 
     def draw(self, context: Context) -> None:
         from .operators import preferences as operators  # which needs these

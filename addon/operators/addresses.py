@@ -14,13 +14,14 @@ from .steps import Stepped
 
 
 class PATINA_OT_import_address(Stepped, Operator):
-    """Show a COPC or an EPT that lies on a server: pictures fetch the points that they show, nothing else is loaded"""
+    """Show a COPC or EPT cloud from a server. Only the points that a view shows are downloaded"""
 
     bl_idname = "import_scene.patina_address"
     bl_label = "Open Point Cloud Address"
     bl_options = {'REGISTER', 'UNDO'}
 
-    address: StringProperty(name="Address", description="Of a COPC file (.copc.laz) or of an EPT's ept.json, beginning with https:// or http://",
+    address: StringProperty(name="Address", description="Address of a COPC file (.copc.laz) or of an ept.json file, starting with https:// or "
+                                                        "http://",
                             options={'SKIP_SAVE'})
 
     def invoke(self, context: Context, _event: bpy.types.Event) -> set[str]:
@@ -59,7 +60,7 @@ class PATINA_OT_import_address(Stepped, Operator):
 
 
 class PATINA_OT_open_address(Operator):
-    """Fetch this object's points from its address from now on, until another file is opened"""
+    """Read this object's points from its address, until another file is opened"""
 
     bl_idname = "object.patina_open_address"
     bl_label = "Open Address"

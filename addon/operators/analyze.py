@@ -30,8 +30,7 @@ _boxes: OrderedDict[tuple[int, ...], Box | None] = OrderedDict()  # without stra
 
 
 class PATINA_OT_analyze(Stepped, Operator):
-    """Find out from the neighbors of each point how the surface lies there, and keep it in attributes: normal, spacing, \
-radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and trust"""
+    """Compute the surface around each point from its neighbors, and store it as attributes: normal, spacing, radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and trust"""
 
     bl_idname = "object.patina_analyze"
     bl_label = "Analyze"
@@ -39,11 +38,11 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and tr
 
     by_grid: BoolProperty(
         name="By Scan Grid", default=False,
-        description="Neighbors in the rows and columns of each scan, not only those in space")
+        description="Also use the neighbors in the rows and columns of each scan")
     soft: BoolProperty(
         name="For Soft Points", default=False, options={'SKIP_SAVE'},
-        description="Also what soft points go by: soft_radius, uncertainty (0 to 1) and density (points for each square of the object's "
-                    "unit). All neighbors are looked at once more")
+        description="Also store the attributes for soft points: soft_radius, uncertainty (0 to 1) and density (points per square unit of the "
+                    "object). Takes about twice as long")
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -113,8 +112,7 @@ def _write(data: bpy.types.ID, name: str, values: np.ndarray) -> None:
 
 
 class PATINA_OT_frame_points(Operator):
-    """Move the scene's camera, and views that do not look through it, without turning them, so that the selected points, or all where \
-none are selected, fill their pictures; strays far off do not count"""
+    """Move the scene's camera and the 3D views, without rotating them, to frame the selected points. Frames all points if none are selected. Ignores distant strays"""
 
     bl_idname = "object.patina_frame_points"
     bl_label = "Frame Points"

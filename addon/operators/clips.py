@@ -40,7 +40,7 @@ class _AddClip:
 
 
 class PATINA_OT_add_clip_box(_AddClip, Operator):
-    """Add a box around the selected points: only what lies in it is drawn. Move, turn and scale it"""
+    """Add a box around the selected points. Only points inside it are drawn. Move, rotate and scale it to clip"""
 
     bl_idname = "object.patina_add_clip_box"
     bl_label = "Add Clip Box"
@@ -52,7 +52,7 @@ class PATINA_OT_add_clip_box(_AddClip, Operator):
 
 
 class PATINA_OT_add_clip_plane(_AddClip, Operator):
-    """Add a plane through the middle of the selected points: what lies above it is not drawn"""
+    """Add a plane through the middle of the selected points. Points above it are not drawn"""
 
     bl_idname = "object.patina_add_clip_plane"
     bl_label = "Add Clip Plane"

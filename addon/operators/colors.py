@@ -24,7 +24,7 @@ class _ColorOperator:
 
 
 class PATINA_OT_new_ramp(_ColorOperator, Operator):
-    """Make a color ramp of your own, from the one chosen now"""
+    """Create an editable copy of the chosen color ramp"""
 
     bl_idname = "object.patina_new_ramp"
     bl_label = "New Custom Ramp"
@@ -45,7 +45,7 @@ class PATINA_OT_new_ramp(_ColorOperator, Operator):
 
 
 class PATINA_OT_robust_range(_ColorOperator, Operator):
-    """Set the range so that 2 % of the points lie below it and 2 % above: strays do not flatten the rest"""
+    """Set the range so that 2 % of the points are below it and 2 % above, so that strays do not flatten the colors"""
 
     bl_idname = "object.patina_robust_range"
     bl_label = "Robust Range"

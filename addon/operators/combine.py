@@ -12,15 +12,14 @@ from ..pairs import MARK
 
 
 class PATINA_OT_combine(Operator):
-    """Let Cycles or EEVEE render this scene, and put Patina's points into its picture: a second scene with the same objects \
-draws them, and the compositor takes what is nearer. That scene follows this one's camera, size, border and frames"""
+    """Render this scene with Cycles or EEVEE, and add Patina's points in the compositor. A second scene with the same objects, camera, resolution and frames renders the points. The nearer surface is shown"""
 
     bl_idname = "scene.patina_combine"
     bl_label = "Combine with Points by Depth"
     bl_options = {'REGISTER', 'UNDO'}
 
     engine: EnumProperty(
-        name="Engine", default='CYCLES', description="What renders everything but the points",
+        name="Engine", default='CYCLES', description="Engine that renders everything except the points",
         items=(('CYCLES', "Cycles", "Cycles", 0), ('EEVEE', "EEVEE", "EEVEE", 1)))
 
     @classmethod
@@ -59,7 +58,7 @@ def _denoises() -> bool:
 
 
 class PATINA_OT_other_scene(Operator):
-    """Show the other scene of the two that are combined in this window"""
+    """Switch this window to the other one of the two combined scenes"""
 
     bl_idname = "scene.patina_other"
     bl_label = "Go to Other Scene"

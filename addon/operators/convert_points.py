@@ -197,8 +197,7 @@ class _Converting:
 
 
 class PATINA_OT_to_point_cloud(_Converting, Operator):
-    """Make the selected meshes of points into point clouds, which Solid shading shows with their colors. Attributes, materials, edits, \
-scans, styles, drivers and Geometry Nodes modifiers stay"""
+    """Convert the selected meshes of points to point cloud objects, which Solid shading shows in color. Keeps attributes, materials, edits, scans, styles, drivers and Geometry Nodes modifiers"""
 
     bl_idname = "object.patina_to_point_cloud"
     bl_label = "Convert to Point Cloud"
@@ -206,8 +205,7 @@ scans, styles, drivers and Geometry Nodes modifiers stay"""
 
 
 class PATINA_OT_to_mesh(_Converting, Operator):
-    """Make the selected point clouds into meshes of points. Attributes, materials, edits, scans, styles, drivers and Geometry Nodes \
-modifiers stay"""
+    """Convert the selected point cloud objects to meshes of points. Keeps attributes, materials, edits, scans, styles, drivers and Geometry Nodes modifiers"""
 
     bl_idname = "object.patina_to_mesh"
     bl_label = "Convert to Mesh"

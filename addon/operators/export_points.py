@@ -20,7 +20,7 @@ from ..sync import analysis, attributes, edits, linked
 
 
 class PATINA_OT_export_points(Operator, ExportHelper):
-    """Export the points of mesh and point cloud objects with colors, normals and scalars, the origin added back"""
+    """Export the points of mesh and point cloud objects with colors, normals and scalars, in the file's original coordinates"""
 
     bl_idname = "export_scene.patina_points"
     bl_label = "Export Points"
@@ -29,12 +29,12 @@ class PATINA_OT_export_points(Operator, ExportHelper):
     kind: EnumProperty(
         name="Format", default='PLY',
         items=(('PLY', "PLY", "Binary, with all scalars and float64 positions", 0),
-               ('LAS', "LAS", "LAS 1.2, point format 3, with the scalars that LAS has a place for", 1),
+               ('LAS', "LAS", "LAS 1.2, point format 3, with the scalars that LAS can store", 1),
                ('LAZ', "LAZ", "LAS 1.2, compressed. Needs the packages laspy and lazrs", 2),
-               ('E57', "E57", "A scan of the file for each scan, with colors and intensity. Needs the package pye57", 3)))
-    selected: BoolProperty(name="Selected Only", default=True, description="Leave out objects that are not selected")
+               ('E57', "E57", "One scan in the file per scan, with colors and intensity. Needs the package pye57", 3)))
+    selected: BoolProperty(name="Selected Only", default=True, description="Export only the selected objects")
     overwrite: BoolProperty(name="Overwrite", default=False, options={'HIDDEN', 'SKIP_SAVE'},
-                            description="Replace a file of the same name. The file dialog asks by itself")
+                            description="Replace an existing file of the same name. The file dialog asks first")
     filter_glob: StringProperty(default=";".join(f"*.{name}" for name in exporters.NEEDS), options={'HIDDEN'})
     filename_ext = ""
     _seen = ""  # the format when the dialog last looked

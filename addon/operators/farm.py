@@ -26,21 +26,23 @@ class Refused(Exception):
 
 
 class PATINA_OT_send_to_farm(Operator):
-    """Write a folder with the scene and the scripts by which Slurm, Open Job Description or Flamenco draw its frames, or the tiles of one large still"""
+    """Write a folder with the scene and scripts for Slurm, Open Job Description or Flamenco, which render its frames or the tiles of one large still"""
 
     bl_idname = "render.patina_farm"
     bl_label = "Send to Farm"
     bl_options = {'REGISTER'}
 
-    directory: StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE'}, description="The job's folder, which all machines reach by the same path")
+    directory: StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE'}, description="Folder of the job. All machines must reach it under the same "
+                                                                                     "path")
     filter_folder: BoolProperty(default=True, options={'HIDDEN'})
-    kind: EnumProperty(name="Tasks", items=(('FRAMES', "Frames", "The frames of the animation, one a task", 0),
-                                            ('TILES', "Tiles", "The picture of this frame, one tile a task", 1)))
-    columns: IntProperty(name="Columns", default=4, min=1, max=256, description="Tiles beside each other")
-    rows: IntProperty(name="Rows", default=4, min=1, max=256, description="Tiles above each other")
+    kind: EnumProperty(name="Tasks", items=(('FRAMES', "Frames", "The frames of the animation, one task per frame", 0),
+                                            ('TILES', "Tiles", "The image of this frame, one task per tile", 1)))
+    columns: IntProperty(name="Columns", default=4, min=1, max=256, description="Number of tiles per row")
+    rows: IntProperty(name="Rows", default=4, min=1, max=256, description="Number of rows of tiles")
     share: BoolProperty(name="Share Built Clouds", default=True,
-                        description="Put what is built of linked scans beside them, in a folder named .patina, so that no machine builds it again")
-    command: StringProperty(options={'HIDDEN', 'SKIP_SAVE'}, description="How Slurm is told, once the folder is there")
+                        description="Store the caches of linked scans next to the scans, in a folder named .patina, so that no machine builds them "
+                                    "again")
+    command: StringProperty(options={'HIDDEN', 'SKIP_SAVE'}, description="How to submit the job to Slurm once the folder is written")
 
     def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
         if not self.directory:

@@ -35,55 +35,54 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
     origin: EnumProperty(
         name="Origin", default='SHARED',
-        description="Where files with large (georeferenced) coordinates go",
+        description="Origin of files with large (georeferenced) coordinates",
         items=(
-            ('SHARED', "Shared", "All files of the scene share one origin and keep their places to each other", 0),
-            ('OWN', "Own", "Each file goes near zero and remembers its own origin", 1)))
+            ('SHARED', "Shared", "All files share one origin and keep their positions relative to each other", 0),
+            ('OWN', "Own", "Each file is moved near zero and stores its own origin", 1)))
     unit: EnumProperty(
         name="Unit", default='FILE',
-        description="How long a unit of the file is. One meter becomes one unit of Blender",
+        description="Length unit of the file. One meter becomes one Blender unit",
         items=(
-            ('FILE', "From File", "What the file's coordinate system says; meters where it says nothing", 0),
+            ('FILE', "From File", "The unit of the file's coordinate system. Meters if the file has none", 0),
             ('METERS', "Meters", "", 1), ('CENTIMETERS', "Centimeters", "", 2), ('MILLIMETERS', "Millimeters", "", 3),
             ('FEET', "Feet", "International feet, 0.3048 m", 4), ('US_FEET', "US Survey Feet", "1200/3937 m", 5),
             ('INCHES', "Inches", "", 6)))
     scale: FloatProperty(name="Scale", default=1.0, min=1e-6, soft_min=0.001, soft_max=1000.0, max=1e6,
-                         description="Multiplied with the unit")
+                         description="Additional scale factor")
     up_axis: EnumProperty(
-        name="Up Axis", default='Z', description="Which of the file's axes points up",
+        name="Up Axis", default='Z', description="Axis of the file that points up",
         items=(
-            ('Z', "Z", "As in Blender, and in surveys", 0), ('Y', "Y", "As in many scans of objects", 1),
-            ('NEGATIVE_Y', "-Y", "As in photogrammetry that begins with a camera", 2)))
+            ('Z', "Z", "As in Blender and in surveys", 0), ('Y', "Y", "As in many scans of objects", 1),
+            ('NEGATIVE_Y', "-Y", "As in photogrammetry whose first camera is the origin", 2)))
     kind: EnumProperty(
-        name="Points As", default='AUTO', description="What holds the points in Blender",
+        name="Points As", default='AUTO', description="Type of the objects that hold the points",
         items=(
-            ('AUTO', "Automatic", "Point clouds from Blender 4.5 on, meshes before", 0),
-            ('POINTCLOUD', "Point Cloud", "Blender's Solid and Material Preview shading show the points with their colors", 1),
-            ('MESH', "Mesh", "Vertices: modifiers other than Geometry Nodes work on these alone", 2)))
+            ('AUTO', "Automatic", "Point clouds in Blender 4.5 and later, meshes in earlier versions", 0),
+            ('POINTCLOUD', "Point Cloud", "Point cloud objects, which Solid and Material Preview shading show in color", 1),
+            ('MESH', "Mesh", "Meshes of vertices. Needed for modifiers other than Geometry Nodes", 2)))
     frame: BoolProperty(name="Frame Points", default=False,
-                        description="Aim the scene's camera at the points afterwards; strays do not count")
+                        description="Aim the scene's camera at the imported points. Ignores distant strays")
     stations: BoolProperty(
         name="Stations", default=True,
-        description="An empty where each scanner stood, as a child of the points, where the file says so (E57, PTX)")
+        description="Add an empty at each scanner position stored in the file (E57, PTX), parented to the points")
     link: BoolProperty(
         name="Link", default=False,
-        description="Keep the points out of Blender: the object is a box, Patina reads the file itself. For scans too large "
-                    "for a mesh; the filters below do not apply")
+        description="Keep the points in the file. The object is a box, and Patina reads the file itself. For scans that are too large for Blender. "
+                    "The filters below do not apply")
     stream: EnumProperty(
         name="Read COPC", default='AUTO',
-        description="Of linked COPC files: as needed there is no conversion, and pictures fetch the points that they show",
+        description="How linked COPC files are read",
         items=(
-            ('AUTO', "Automatic", "As needed from 20 million points on", 0),
-            ('ON', "As Needed", "Without conversion, analysis and stations", 1),
-            ('OFF', "Whole", "Converted, analyzed and kept", 2)))
+            ('AUTO', "Automatic", "As needed for files of 20 million points or more", 0),
+            ('ON', "As Needed", "Read the points that a view shows. No conversion, analysis or stations", 1),
+            ('OFF', "Whole", "Convert, analyze and cache the whole file", 2)))
     sequence: BoolProperty(
         name="Sequence", default=False,
-        description="Files in the same folder whose names differ by a number become one object, which shows one of them a "
-                    "frame")
+        description="Import numbered files of the same folder as one object that shows one file per frame")
     every: IntProperty(
         name="Keep Every", default=1, min=1, soft_max=100,
-        description="Keep each so-manieth point: 1 keeps all, 10 a tenth")
-    use_box: BoolProperty(name="Only Within a Box", default=False, description="Leave out points outside of a box")
+        description="Keep one point of this many. 1 keeps all, 10 keeps a tenth")
+    use_box: BoolProperty(name="Only Within a Box", default=False, description="Leave out points outside a box")
     box_min: FloatVectorProperty(name="From", subtype='XYZ', precision=3,
                                  description="Lower corner, in the file's own coordinates")
     box_max: FloatVectorProperty(name="To", subtype='XYZ', precision=3, default=(1.0, 1.0, 1.0),

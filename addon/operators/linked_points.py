@@ -17,7 +17,7 @@ from . import export_points
 
 
 class PATINA_OT_linked_to_mesh(Operator):
-    """Read the linked file's points into Blender, to edit them; those that were deleted stay out"""
+    """Import the linked file's points into Blender for editing. Deleted points are left out"""
 
     bl_idname = "object.patina_linked_to_mesh"
     bl_label = "Convert to Mesh"
@@ -50,7 +50,7 @@ class PATINA_OT_linked_to_mesh(Operator):
 
 
 class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
-    """Write the object's points to a PLY file and keep only a link to it"""
+    """Write the object's points to a PLY file and replace them with a link to it"""
 
     bl_idname = "object.patina_mesh_to_linked"
     bl_label = "Convert to Linked Cloud"

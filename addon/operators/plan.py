@@ -22,7 +22,7 @@ WORLD_FILES = {".png": ".pgw", ".tif": ".tfw", ".tiff": ".tfw", ".jpg": ".jgw", 
 
 
 class PATINA_OT_render_plan(Operator, ExportHelper):
-    """Render the selected points from above to a stated scale, with a world file beside the picture"""
+    """Render the selected points from above at a fixed scale, with a world file next to the image"""
 
     bl_idname = "render.patina_plan"
     bl_label = "Render Plan"
@@ -32,13 +32,13 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
     filter_glob: StringProperty(default="*.png;*.tif;*.tiff", options={'HIDDEN'})
     check_extension = None  # PNG or TIFF, as the name says
     scale: FloatProperty(name="Scale 1 :", default=100.0, min=1e-3, soft_max=10000.0, precision=1,
-                         description="Meters in the scene for each meter on paper")
+                         description="Meters in the scene per meter on paper")
     dpi: FloatProperty(name="Dots per Inch", default=300.0, min=1.0, soft_max=1200.0, precision=0,
-                       description="Of the printer: together with the scale it decides how large a pixel is")
+                       description="Resolution of the printer. Together with the scale it sets the size of a pixel")
     margin: FloatProperty(name="Margin", default=0.02, min=0.0, max=1.0, subtype='FACTOR',
-                          description="Room around the points, as a share of the longer side")
+                          description="Margin around the points, as a share of the longer side")
     write_picture: BoolProperty(name="Render", default=True,
-                                description="Render at once; else only the camera and the picture's size are set")
+                                description="Render immediately. Disabled: only set the camera and the resolution")
 
     def execute(self, context: Context) -> set[str]:
         scene = context.scene

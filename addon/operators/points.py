@@ -17,8 +17,8 @@ from ..native.points import pick
 from ..sync import clips, clouds, edits, files, linked, sequence, style_of
 from ..sync.analyzing import ANALYSES
 
-HOW = (('SET', "Set", "Only these", 0), ('ADD', "Extend", "These too", 1), ('SUB', "Subtract", "Not these", 2),
-       ('AND', "Intersect", "Of the selected ones only these", 3))
+HOW = (('SET', "Set", "Select only these points", 0), ('ADD', "Extend", "Add to the selection", 1), ('SUB', "Subtract", "Remove from the selection", 2),
+       ('AND', "Intersect", "Keep only selected points that are also in this group", 3))
 
 
 def editable(obj: Object | None) -> str:
@@ -116,7 +116,7 @@ def drawn_alone(context: Context, obj: Object, cloud: native.Cloud, work: Callab
 
 
 class PATINA_OT_points_select_all(Editing, Operator):
-    """Select all points of a linked cloud that are not hidden, none, or the others"""
+    """Select or deselect all visible points of a linked cloud, or invert the selection"""
 
     bl_idname = "object.patina_points_select_all"
     bl_label = "Select All Points"
@@ -140,14 +140,14 @@ _items: list[tuple] = []  # Blender keeps no reference to the texts
 
 
 class PATINA_OT_points_select_by(Editing, Operator):
-    """Select the points of a class, of a scan, or within a clip box or on the kept side of a clip plane"""
+    """Select the points of a class, of a scan, or inside the active clip box or plane"""
 
     bl_idname = "object.patina_points_select_by"
     bl_label = "Select Points By"
 
     by: EnumProperty(name="By", items=(('CLASS', "Class", "", 0), ('SCAN', "Scan", "", 1), ('CLIP', "Clip", "", 2)))
     how: EnumProperty(name="How", items=HOW)
-    number: IntProperty(name="Number", min=0, max=65535, description="Of the class, or the scan's as the file has it")
+    number: IntProperty(name="Number", min=0, max=65535, description="Number of the class, or of the scan as stored in the file")
     clip: EnumProperty(name="Clip", items=_clip_items, options={'SKIP_SAVE'})
 
     def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits:
@@ -180,12 +180,12 @@ class PATINA_OT_points_select_by(Editing, Operator):
 
 
 class PATINA_OT_points_hide(Editing, Operator):
-    """Hide the selected points of a linked cloud, in views and final renders"""
+    """Hide the selected points of a linked cloud in the viewport and in renders"""
 
     bl_idname = "object.patina_points_hide"
     bl_label = "Hide Selected Points"
 
-    unselected: BoolProperty(name="Unselected", default=False, description="Hide the others instead")
+    unselected: BoolProperty(name="Unselected", default=False, description="Hide the unselected points instead")
 
     def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits | None:
         which = edits.every(old.count) & ~old.selected if self.unselected else old.selected
@@ -196,12 +196,12 @@ class PATINA_OT_points_hide(Editing, Operator):
 
 
 class PATINA_OT_points_reveal(Editing, Operator):
-    """Show the hidden points of a linked cloud again, and select them"""
+    """Reveal and select the hidden points of a linked cloud"""
 
     bl_idname = "object.patina_points_reveal"
     bl_label = "Reveal Hidden Points"
 
-    select: BoolProperty(name="Select", default=True, description="Select what comes back")
+    select: BoolProperty(name="Select", default=True, description="Select the revealed points")
 
     def came_back(self, old: edits.Edits) -> str:
         return f"{old.totals['hidden']:,} shown again"
@@ -211,7 +211,7 @@ class PATINA_OT_points_reveal(Editing, Operator):
 
 
 class PATINA_OT_points_delete(Editing, Operator):
-    """Delete the selected points of a linked cloud: they are gone from pictures and exports. The file itself stays as it is"""
+    """Delete the selected points of a linked cloud from renders and exports. The file is not changed"""
 
     bl_idname = "object.patina_points_delete"
     bl_label = "Delete Selected Points"
@@ -224,7 +224,7 @@ class PATINA_OT_points_delete(Editing, Operator):
 
 
 class PATINA_OT_points_restore(Editing, Operator):
-    """Bring the deleted points of a linked cloud back, and select them"""
+    """Restore and select the deleted points of a linked cloud"""
 
     bl_idname = "object.patina_points_restore"
     bl_label = "Restore Deleted Points"
@@ -237,7 +237,7 @@ class PATINA_OT_points_restore(Editing, Operator):
 
 
 class PATINA_OT_points_forget(Operator):
-    """Show all points as the file has them: none is hidden, deleted or selected any more"""
+    """Discard all edits: no point is hidden, deleted or selected"""
 
     bl_idname = "object.patina_points_forget"
     bl_label = "Forget All Edits"

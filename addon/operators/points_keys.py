@@ -49,7 +49,7 @@ class PATINA_OT_points_key_hide(_Key, Operator):
 
 
 class PATINA_OT_points_key_reveal(_Key, Operator):
-    """Show the hidden points of a linked cloud again, where no object is hidden that the key would bring back"""
+    """Reveal the hidden points of a linked cloud, if no hidden object would be revealed by the same key"""
 
     bl_idname = "object.patina_points_key_reveal"
     bl_label = "Reveal Hidden Points"

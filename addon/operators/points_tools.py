@@ -34,8 +34,7 @@ def targets(context: Context) -> list[Object]:
 
 
 class PATINA_OT_points_select(OverView, Operator):
-    """Select points of linked clouds by drawing a box or a lasso around them. Shift extends the selection, Ctrl subtracts from it, \
-both intersect"""
+    """Select points of linked clouds with a box or lasso. Shift extends, Ctrl subtracts, Shift+Ctrl intersects"""
 
     bl_idname = "object.patina_points_select"
     bl_label = "Select Points"
@@ -45,7 +44,7 @@ both intersect"""
     # not of the last time: keys and the panel say them
     how: EnumProperty(name="How", items=HOW, options={'SKIP_SAVE'})
     through: BoolProperty(name="Through", default=False, options={'SKIP_SAVE'},
-                          description="Points that others hide too; else only those that the view shows")
+                          description="Also select points hidden behind others")
     path: CollectionProperty(type=OperatorMousePath, options={'SKIP_SAVE', 'HIDDEN'})  # corners; of a box two
 
     poll = Editing.poll

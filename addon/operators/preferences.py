@@ -51,7 +51,7 @@ class _Installing(Stepped):
 
 
 class PATINA_OT_install_readers(_Installing, Operator):
-    """Download the missing packages that read LAZ, COPC and E57 from PyPI, into Patina's own folder"""
+    """Download the missing packages for LAZ, COPC and E57 from PyPI into Patina's folder"""
 
     bl_idname = "patina.install_readers"
     bl_label = "Install Readers"
@@ -76,7 +76,7 @@ class PATINA_OT_install_readers(_Installing, Operator):
 
 
 class PATINA_OT_install_reader_files(_Installing, Operator, ImportHelper):
-    """Install the packages that read LAZ, COPC and E57 from wheels (.whl) that were fetched before: without a network"""
+    """Install the packages for LAZ, COPC and E57 from wheel files (.whl), without a network"""
 
     bl_idname = "patina.install_reader_files"
     bl_label = "Install from Files..."
@@ -100,7 +100,7 @@ class PATINA_OT_install_reader_files(_Installing, Operator, ImportHelper):
 
 
 class PATINA_OT_clear_cache(Operator):
-    """Delete kept clouds of linked files. They are made anew when they are drawn"""
+    """Delete the caches of linked files. They are rebuilt when needed"""
 
     bl_idname = "patina.clear_cache"
     bl_label = "Clear"
@@ -114,7 +114,7 @@ class PATINA_OT_clear_cache(Operator):
 
 
 class PATINA_OT_clear_pages(Operator):
-    """Delete what was fetched of addresses and slow shares and is kept on this disk. It is fetched anew when it is shown"""
+    """Delete the downloaded points on this disk. They are downloaded again when needed"""
 
     bl_idname = "patina.clear_pages"
     bl_label = "Clear Fetched Points"
@@ -128,7 +128,7 @@ class PATINA_OT_clear_pages(Operator):
 
 
 class PATINA_OT_open_manual(Operator):
-    """Open what tells how to use Patina"""
+    """Open the user manual"""
 
     bl_idname = "patina.open_manual"
     bl_label = "Manual"

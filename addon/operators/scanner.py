@@ -21,14 +21,14 @@ def positions(obj: bpy.types.Object | None) -> np.ndarray:
 
 
 class PATINA_OT_camera_at_scanner(Operator):
-    """Add a camera at the place of a scan, which sees what the scanner saw: level, north in the middle"""
+    """Add a level camera at the position of a scan, facing the scan's north"""
 
     bl_idname = "object.patina_camera_at_scanner"
     bl_label = "Camera at Scanner Position"
     bl_options = {'REGISTER', 'UNDO'}
 
-    scan: IntProperty(name="Scan", default=0, min=0, description="Which scan of the file, from 0")
-    panoramic: BoolProperty(name="Panoramic", default=True, description="All around, as an equirectangular picture")
+    scan: IntProperty(name="Scan", default=0, min=0, description="Number of the scan in the file, starting at 0")
+    panoramic: BoolProperty(name="Panoramic", default=True, description="Equirectangular camera that sees all directions")
 
     @classmethod
     def poll(cls, context: Context) -> bool:

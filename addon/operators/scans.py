@@ -69,8 +69,7 @@ class OfScans:
 
 
 class PATINA_OT_scans_list(OfScans, Operator):
-    """List the scans that the points are of, so that each can be hidden, and its colors graded. What is listed already keeps its
-    settings"""
+    """List the scans of the points, to hide or grade each one. Listed scans keep their settings"""
 
     bl_idname = "object.patina_scans_list"
     bl_label = "List Scans"
@@ -109,7 +108,7 @@ def _value(item: bpy.types.PropertyGroup, name: str) -> float | bool | tuple[flo
 
 
 class PATINA_OT_scans_reset(OfScans, Operator):
-    """Show all scans, and their colors as the file has them"""
+    """Show all scans with their original colors"""
 
     bl_idname = "object.patina_scans_reset"
     bl_label = "Reset Scans"
@@ -123,7 +122,7 @@ class PATINA_OT_scans_reset(OfScans, Operator):
 
 
 class PATINA_OT_scans_color(OfScans, Operator):
-    """Color each point by its scan. Needs points of two scans or more. Set Color to Own Colors to undo it"""
+    """Color each point by its scan. Needs at least two scans. Set Color to Own Colors to return"""
 
     bl_idname = "object.patina_scans_color"
     bl_label = "Color by Scan"

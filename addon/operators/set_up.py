@@ -60,9 +60,7 @@ def _reaches(lamp: Object, corners: Sequence[Vector]) -> bool:
 
 
 class PATINA_OT_set_up(Operator):
-    """Render with Patina: deletes the start scene's cube, aims the camera at the points and looks through it. Colors are shown as they \
-were taken, intensity and classes as colors, points without any of these in the style Plaster. If no light reaches lit points, \
-the headlight is turned on"""
+    """Set the scene up for Patina: delete the default cube, frame the points, and look through the camera. Scan colors are shown unlit, intensity and classes as colors, and uncolored points in the style Plaster. Enables the headlight if no light reaches lit points"""
 
     bl_idname = "scene.patina_set_up"
     bl_label = "Set Up for Points"

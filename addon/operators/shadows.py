@@ -44,7 +44,7 @@ class _ShadowOperator:
 
 
 class PATINA_OT_bake_shadows(_ShadowOperator, Operator, ExportHelper):
-    """Compute the shadows of all lights once, and keep them in a file"""
+    """Compute the shadows of all lights once and save them to a file"""
 
     bl_idname = "patina.bake_shadows"
     bl_label = "Bake Shadows"
@@ -59,7 +59,7 @@ class PATINA_OT_bake_shadows(_ShadowOperator, Operator, ExportHelper):
 
 
 class PATINA_OT_load_shadows(_ShadowOperator, Operator, ImportHelper):
-    """Take shadows from a file that was baked for this scene; says why when they do not fit"""
+    """Load baked shadows for this scene. Reports why they do not fit, if so"""
 
     bl_idname = "patina.load_shadows"
     bl_label = "Load Shadows"

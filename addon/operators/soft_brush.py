@@ -24,8 +24,7 @@ _NAVIGATION = ('MIDDLEMOUSE', 'WHEEL', 'TRACKPAD', 'MOUSEROTATE', 'MOUSESMARTZOO
 
 
 class PATINA_OT_soft_brush(OverView, Operator):
-    """Paint which points of the active cloud are soft, in a 3D view. Drag paints, Shift paints them hard again, [ and ] or Ctrl and the \
-wheel change the radius, X paints hidden points too, Enter or Esc ends"""
+    """Paint the soft points of the active cloud in the 3D viewport. Drag to paint, Shift to erase, [ and ] or Ctrl Wheel to change the radius, X to include hidden points, Enter or Esc to finish"""
 
     bl_idname = "object.patina_soft_brush"
     bl_label = "Paint Soft Points"

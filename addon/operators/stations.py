@@ -48,7 +48,7 @@ def add(obj: Object, collections: list[bpy.types.Collection]) -> int:
 
 
 class PATINA_OT_add_stations(Operator):
-    """Add an empty where each scanner stood, as far as the file says so; those that are there stay"""
+    """Add an empty at each scanner position that the file stores. Existing ones are kept"""
 
     bl_idname = "object.patina_add_stations"
     bl_label = "Add Stations"

@@ -52,12 +52,12 @@ class _StyleOperator:
 
 
 class PATINA_OT_apply_style(_StyleOperator, Operator):
-    """Give the scene and its points the look of a style"""
+    """Apply the style to the scene and its points"""
 
     bl_idname = "patina.apply_style"
     bl_label = "Apply Style"
 
-    style: StringProperty(name="Style", description="Name of the style's file, without its ending")
+    style: StringProperty(name="Style", description="File name of the style, without extension")
 
     def _work(self, context: Context) -> list[str]:
         found = styles.entry(self.style)
@@ -68,16 +68,16 @@ class PATINA_OT_apply_style(_StyleOperator, Operator):
 
 
 class PATINA_OT_save_style(_StyleOperator, Operator):
-    """Keep the look of the scene and of the active points as a style of your own"""
+    """Save the look of the scene and of the active points as a style"""
 
     bl_idname = "patina.save_style"
     bl_label = "Save Style"
 
-    name: StringProperty(name="Name", default="My Style", description="One that exists already is replaced")
+    name: StringProperty(name="Name", default="My Style", description="Replace an existing style of the same name")
     thumbnail: EnumProperty(
         name="Thumbnail", default='SAMPLE',
-        description="What the style's picture shows",
-        items=(('SAMPLE', "Sample", "An urn in this look", 0), ('SCENE', "This Scene", "The middle of the camera's view", 1)))
+        description="Content of the preview image",
+        items=(('SAMPLE', "Sample", "An urn in this style", 0), ('SCENE', "This Scene", "The center of the camera's view", 1)))
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -101,7 +101,7 @@ class PATINA_OT_save_style(_StyleOperator, Operator):
 
 
 class PATINA_OT_load_style(_StyleOperator, Operator, ImportHelper):
-    """Take a style from a file among your own, and apply it"""
+    """Load a style from a file, add it to your styles, and apply it"""
 
     bl_idname = "patina.load_style"
     bl_label = "Load Style"
@@ -128,7 +128,7 @@ class PATINA_OT_load_style(_StyleOperator, Operator, ImportHelper):
 
 
 class PATINA_OT_delete_style(_StyleOperator, Operator):
-    """Delete the chosen style, if it is one of your own. The scene keeps its look"""
+    """Delete the chosen style, if it is your own. The scene does not change"""
 
     bl_idname = "patina.delete_style"
     bl_label = "Delete Style"

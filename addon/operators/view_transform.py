@@ -8,7 +8,7 @@ from bpy.types import Context, Operator
 
 
 class PATINA_OT_true_colors(Operator):
-    """Set the view transform to Standard, which shows a scan's colors as they were taken"""
+    """Set the view transform to Standard, which shows scan colors unchanged"""
 
     bl_idname = "render.patina_true_colors"
     bl_label = "Show Colors as Scanned"

@@ -15,7 +15,7 @@ _ALONG_X = Matrix(((0, 0, -1, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
 
 
 class PATINA_OT_bake_world(Operator):
-    """Render the world all around with Cycles, once, and use that picture in place of its nodes"""
+    """Render the world with Cycles once, and use that image in place of its nodes"""
 
     bl_idname = "world.patina_bake"
     bl_label = "Bake World"
@@ -23,8 +23,8 @@ class PATINA_OT_bake_world(Operator):
 
     width: IntProperty(
         name="Width", default=2048, min=64, max=16384, subtype='PIXEL',
-        description="Of the picture; it is half as high")
-    samples: IntProperty(name="Samples", default=16, min=1, soft_max=256, description="Of each of its pixels")
+        description="Width of the image. Its height is half of that")
+    samples: IntProperty(name="Samples", default=16, min=1, soft_max=256, description="Samples per pixel")
 
     @classmethod
     def poll(cls, context: Context) -> bool:

@@ -46,155 +46,144 @@ class PatinaSceneProperties(PropertyGroup):
     lines: PointerProperty(type=PatinaLinesProperties, override=_OVERRIDE)
     surface: EnumProperty(
         name="Surface", override=_OVERRIDE, default='AUTO',
-        description="How points become a surface",
+        description="How the points become a surface",
         items=(
-            ('AUTO', "Automatic", "Points that lie wide apart on screen are discs as wide as their neighborhood says, the others "
-                                  "are filled", 0),
-            ('FILL', "Filled", "Gaps between the points are filled in the picture: fast, whatever the spacing", 2),
-            ('SPLATS', "Discs", "Every point is a small disc across its normal, discs that overlap are blended: smoother, "
-                                "slower, gaps wider than the discs stay open", 1),
-            ('RANGES', "Range Images", "Points are merged in a coarser picture, and its pixels joined: scans that do not quite fit are one "
-                                       "surface, which needs neither normals nor an analysis", 3)))
+            ('AUTO', "Automatic", "Points that are far apart on screen are drawn as discs, the others are filled", 0),
+            ('FILL', "Filled", "Gaps between points are filled in image space. Fast at any spacing", 2),
+            ('SPLATS', "Discs", "Each point is a disc across its normal, and overlapping discs are blended. Smoother and slower. Gaps wider than the "
+                                "discs stay open", 1),
+            ('RANGES', "Range Images", "Points are merged in a coarser image whose pixels are joined. Merges scans that do not fit exactly. Needs no "
+                                       "normals and no analysis", 3)))
     error_target: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
-        description="Expected error of colors, in percent of white, that the picture may have: the cheapest quality and "
-                    "hole filling that keep to it are chosen")
-    use_error_target: switch("error_target", 1.0, "Quality and hole filling follow an expected error; else they are as set below")
+        description="Largest expected color error, in percent of white. Patina chooses the fastest quality and hole filling that stays below it")
+    use_error_target: switch("error_target", 1.0, "Choose quality and hole filling by an expected error. Disabled: use the settings below")
     quality: EnumProperty(
         name="Quality", override=_OVERRIDE, default='REFINED',
         description="How filled pixels get their depth and normal",
         items=(
-            ('REFINED', "Refined", "Filled pixels lie on the tangent plane of the point that fills them", 0),
-            ('PAPER', "As in the Paper", "Filled pixels take depth and normal of the point that fills them", 1)))
+            ('REFINED', "Refined", "Filled pixels are placed on the tangent plane of the point that fills them", 0),
+            ('PAPER', "As in the Paper", "Filled pixels take the depth and normal of the point that fills them", 1)))
     fill: EnumProperty(
         name="Hole Filling", override=_OVERRIDE, default='CLOSED',
-        description="How gaps between points close",
+        description="How gaps between points are closed",
         items=(
-            ('CLOSED', "Closed", "Gaps close, outlines do not grow", 0),
-            ('PAPER', "As in the Paper", "A fixed number of fills; outlines grow a little", 1),
-            ('OFF', "Off", "Only measured points", 2)))
+            ('CLOSED', "Closed", "Gaps are closed, and outlines do not grow", 0),
+            ('PAPER', "As in the Paper", "A fixed number of iterations. Outlines grow slightly", 1),
+            ('OFF', "Off", "Draw only measured points", 2)))
     fill_iterations: IntProperty(
         name="Iterations", override=_OVERRIDE, default=0, min=0, max=64,
-        description="Rounds of hole filling")
-    use_fill_iterations: switch("fill_iterations", 4, "A fixed number of rounds; else it follows the spacing of the points on screen")
+        description="Number of iterations of hole filling")
+    use_fill_iterations: switch("fill_iterations", 4, "Use a fixed number of iterations. Disabled: it follows the spacing of the points on screen")
     smooth: EnumProperty(
         name="Smoothing", override=_OVERRIDE, default='ALLEVIATED',
-        description="Smooths colors between neighboring pixels of one surface",
+        description="Smooth the colors of neighboring pixels on the same surface",
         items=(
-            ('ALLEVIATED', "Alleviated Gaussian", "Weights 16, 2 and 1: takes the noise, keeps the detail", 0),
+            ('ALLEVIATED', "Alleviated Gaussian", "Weights 16, 2 and 1. Reduces noise and keeps detail", 0),
             ('GAUSSIAN', "Gaussian", "3 × 3 Gaussian", 1),
             ('BOX', "Box", "Mean of 3 × 3 pixels", 2),
-            ('OFF', "Off", "Colors as they are", 3)))
+            ('OFF', "Off", "Colors are not changed", 3)))
     antialias: EnumProperty(
         name="Anti-Aliasing", override=_OVERRIDE, default='LAYERS',
-        description="Which edges are blended",
+        description="Which edges are anti-aliased",
         items=(
-            ('LAYERS', "All Edges", "Edges before the background and between layers", 0),
-            ('BACKGROUND', "Background Edges", "Edges before the background only", 1),
-            ('OFF', "Off", "Hard edges", 2)))
+            ('LAYERS', "All Edges", "Edges against the background and between layers", 0),
+            ('BACKGROUND', "Background Edges", "Edges against the background only", 1),
+            ('OFF', "Off", "No anti-aliasing", 2)))
     soft_model: EnumProperty(
         name="Model", override=_OVERRIDE, default='EXPRESS',
-        description="How soft points of all objects of the scene are summed up along the eye's ray",
+        description="How the soft points of all objects are combined along a view ray",
         items=(
-            ('BASE', "Base", "Exactly, where balls intersect too", 0),
-            ('CONCENTRIC', "Concentric", "By shells of even density: close to Base", 1),
-            ('EXPRESS', "Express", "A disc a ball: about ten times faster", 2),
-            ('SPLATS', "Splats", "To compare with: the nearest discs alone, opaque", 3),
-            ('ONE_LAYER', "One Layer", "To compare with: the nearest discs alone, transparent", 4)))
+            ('BASE', "Base", "Exact, also where balls intersect", 0),
+            ('CONCENTRIC', "Concentric", "Shells of constant density. Close to Base", 1),
+            ('EXPRESS', "Express", "One disc per ball. About ten times faster", 2),
+            ('SPLATS', "Splats", "For comparison: only the nearest discs, opaque", 3),
+            ('ONE_LAYER', "One Layer", "For comparison: only the nearest discs, transparent", 4)))
     layers: IntProperty(
         name="Layers", override=_OVERRIDE, default=8, min=1, max=MOST_LAYERS,
-        description="At most so many layers of surface are drawn behind one another where something is transparent. "
-                    "Fewer when nothing is left to show: opaque scenes have one")
+        description="Largest number of surface layers to draw where something is transparent. Opaque scenes need one layer only")
     use_shadows: BoolProperty(
         name="Shadows", override=_OVERRIDE, default=True,
-        description="Points in the shadow of others get no light from lights that cast shadows")
+        description="Points cast shadows on each other, from lights that cast shadows")
     shadow_samples: IntProperty(
         name="Samples", override=_OVERRIDE, default=16, min=1, max=4096, soft_max=256,
-        description="Points of a light's area that shadows are gathered from; sharp lights need one")
+        description="Number of shadow samples per light. Lights without a size need one")
     shadow_error: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
-        description="Expected error of soft shadows, in percent of their light: each light takes as many samples as it needs, "
-                    "at most 256")
-    use_shadow_error: switch("shadow_error", 1.0, "Each light's samples follow an expected error; else there are as many as set below")
+        description="Largest expected error of soft shadows, in percent of their light. Each light takes as many samples as needed, up to 256")
+    use_shadow_error: switch("shadow_error", 1.0, "Choose each light's samples by an expected error. Disabled: use the number below")
     shadow_resolution: IntProperty(
         name="Resolution", override=_OVERRIDE, default=4096, min=16, max=16384, subtype='PIXEL',
-        description="Most texels along a side of a light's depth map; it has fewer where the points lie wider")
+        description="Largest width of a shadow map, in texels. Sparse points need fewer")
     shadow_uncut: BoolProperty(
         name="Cut Parts Cast Shadows", override=_OVERRIDE, default=False,
-        description="What clip boxes and planes cut away still casts shadows")
+        description="Clipped points still cast shadows")
     shadow_file: StringProperty(
         name="Baked", override=_OVERRIDE, subtype='FILE_PATH', options=_PATH,
-        description="Shadow textures to take from a file instead of computing them; empty: none")
+        description="File of baked shadows to use instead of computing them. Empty: compute them")
     device: EnumProperty(
         name="Device", override=_OVERRIDE, default='AUTO',
-        description="What computes the picture",
+        description="Device that computes the image",
         items=(
-            ('AUTO', "Automatic", "The GPU where there is one, else the processor", 0),
-            ('CPU', "Processor", "The same pixels on every machine", 1),
-            ('CPU_SCALAR', "Processor, Plain", "Without vector instructions: slow, for comparison", 2),
+            ('AUTO', "Automatic", "The GPU if there is one, otherwise the processor", 0),
+            ('CPU', "Processor", "SIMD code on the processor. Gives the same pixels on each machine", 1),
+            ('CPU_SCALAR', "Processor, Plain", "No vector instructions. Slow, for comparison", 2),
             ('GL', "OpenGL", "OpenGL 4.3 compute shaders", 3),
-            ('GL_SOFTWARE', "OpenGL in Software", "OpenGL on the processor: slow, for comparison", 4)))
+            ('GL_SOFTWARE', "OpenGL in Software", "OpenGL on the processor. Slow, for comparison", 4)))
     threads: IntProperty(
         name="Threads", override=_OVERRIDE, default=0, min=0, max=1024,
-        description="Processor threads. Never changes the picture")
-    use_threads: switch("threads", 4, "A fixed number of threads; else Blender's own setting holds")
+        description="Number of processor threads. Does not change the image")
+    use_threads: switch("threads", 4, "Use a fixed number of threads. Disabled: Blender's own setting")
 
     meshes: EnumProperty(
         name="Meshes", override=_OVERRIDE, default='TRIANGLES',
-        description="How meshes with faces are in the picture",
+        description="How meshes with faces are rendered",
         items=(
-            ('TRIANGLES', "As They Are", "Exactly, with the material's base color and lit: meshes hide points and points hide "
-                                         "meshes", 2),
-            ('OFF', "Not Drawn", "Only points; a warning names the meshes", 0),
-            ('POINTS', "As Points", "Points are spread over the faces, and filled, smoothed and lit as the others are", 1)))
+            ('TRIANGLES', "As They Are", "Render the faces with the material's base color, lit. Meshes and points hide each other", 2),
+            ('OFF', "Not Drawn", "Render only points. A warning names the meshes", 0),
+            ('POINTS', "As Points", "Scatter points over the faces, and render them like other points", 1)))
     mesh_points: IntProperty(
         name="Points per Mesh", override=_OVERRIDE, default=500000, min=100, soft_max=5000000,
-        description="How many points are spread over each mesh")
+        description="Number of points to scatter over each mesh")
     depth: EnumProperty(
         name="Depth", override=_OVERRIDE, default='POINT',
-        description="What the Depth pass tells of points that are filled",
+        description="What the Depth pass contains where points are filled",
         items=(
-            ('POINT', "Of Points", "That of the nearest point in the pixel, as it was measured", 0),
-            ('SURFACE', "Of the Surface", "That of the surface in the middle of the pixel: no nearer than it is where points lie "
-                                          "dense or slopes are steep", 1)))
+            ('POINT', "Of Points", "Depth of the nearest point in the pixel, as measured", 0),
+            ('SURFACE', "Of the Surface", "Depth of the surface at the center of the pixel. More accurate on dense points and steep slopes", 1)))
     average: BoolProperty(
         name="Average Points", override=_OVERRIDE, default=False,
-        description="A pixel shows the mean of all points about its surface, in place of the nearest one alone: truer where "
-                    "several fall into a pixel, as in far ground, and steadier in animations. A picture takes two to three times as "
-                    "long, and surfaces nearer to each other than two spacings mix. Not of color ramps, nor of points with opacities "
-                    "of their own")
+        description="Show the mean color of all points on a pixel's surface, instead of the nearest point's color. Reduces noise and flicker where "
+                    "several points share a pixel. Takes two to three times as long, and mixes surfaces closer than two spacings. Has no effect on "
+                    "color ramps and on points with their own opacity")
     samples: IntProperty(
         name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
-        description="Of each pixel: a final render takes the mean of about so many finer or shifted ones, each anti-aliased as "
-                    "set. Esc keeps those that there are. Data passes are those of one sample")
+        description="Samples per pixel of a final render. Esc keeps the samples rendered so far. Data passes use one sample")
     noise: FloatProperty(
         name="Noise Threshold", override=_OVERRIDE, default=0.0, min=0.0, soft_max=0.1, max=1.0, step=0.1, precision=4,
-        description="Samples end once colors are expected to be off by no more than this share of white, at Samples at the latest "
-                    "(1: at 256)")
-    use_noise: switch("noise", 0.01, "Samples end once the picture is good enough; else all of them are taken")
+        description="Stop sampling once the expected color error is below this share of white. Takes at most Samples (256 if Samples is 1)")
+    use_noise: switch("noise", 0.01, "Stop sampling once the image is good enough. Disabled: take all samples")
     viewport_samples: IntProperty(
         name="Viewport Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
-        description="Of each pixel of a viewport at rest, one after another: the picture betters until the view moves")
+        description="Samples per pixel in the viewport. They accumulate while the view is still")
     viewport_noise: FloatProperty(
         name="Viewport Noise Threshold", override=_OVERRIDE, default=0.0, min=0.0, soft_max=0.1, max=1.0, step=0.1, precision=4,
-        description="Samples of a viewport at rest end once colors are expected to be off by no more than this share of white, at "
-                    "Viewport Samples at the latest (1: at 256)")
-    use_viewport_noise: switch("viewport_noise", 0.02, "Samples end once the picture is good enough; else all of them are taken")
+        description="Stop sampling in the viewport once the expected color error is below this share of white. Takes at most Viewport Samples (256 "
+                    "if it is 1)")
+    use_viewport_noise: switch("viewport_noise", 0.02, "Stop sampling once the image is good enough. Disabled: take all samples")
     motion_steps: IntProperty(
         name="Steps", override=_OVERRIDE, default=8, min=1, soft_max=64, max=1024,
-        description="Moments while the shutter is open that a final render takes the mean of. Samples for anti-aliasing are "
-                    "spread over them, at least one each")
+        description="Number of moments for motion blur while the shutter is open. The render samples are distributed over them, at least one each")
     tile_size: IntProperty(
         name="Tile Size", override=_OVERRIDE, default=0, min=0, max=16384, subtype='PIXEL',
-        description="Side of the tiles that large pictures are made in: less memory, the same pixels")
-    use_tile_size: switch("tile_size", 2048, "Tiles of a fixed size; else they are as large as the memory that is free allows, at most "
-                                             "4096")
+        description="Width of the tiles of large renders, in pixels. Saves memory, gives the same pixels")
+    use_tile_size: switch("tile_size", 2048, "Use tiles of a fixed size. Disabled: as large as the free memory allows, at most 4096")
     navigation_ms: IntProperty(
         name="Navigation", override=_OVERRIDE, default=60, min=5, soft_max=200, max=1000,
-        description="Milliseconds until a picture of the viewport is seen while the view moves, with what Blender takes for "
-                    "its window; fewer points and pixels are drawn until it fits. At rest the whole picture follows")
+        description="Time per viewport frame while the view moves, in milliseconds. Patina draws fewer points and pixels to meet it. All points are "
+                    "drawn once the view is still")
 
 
 def _known_distance(group: PropertyGroup) -> float:
@@ -224,122 +213,118 @@ class PatinaObjectProperties(PropertyGroup):
     clip: PointerProperty(type=PatinaClipProperties, override=_OVERRIDE)
     lighting: EnumProperty(
         name="Lighting", override=_OVERRIDE, default='AUTO',
-        description="Whether the scene's lights shade the points",
+        description="How the points are lit",
         items=(
-            ('AUTO', "Automatic", "Points with colors are unlit (a scan's colors hold the light of its day), "
-                                  "others lit", 0),
-            ('UNLIT', "Unlit", "Colors as they are", 1),
-            ('LIT', "Lit", "Shaded by lights and world", 2)))
+            ('AUTO', "Automatic", "Points with colors are unlit, since scan colors already contain light. Others are lit", 0),
+            ('UNLIT', "Unlit", "Show the points' colors unchanged", 1),
+            ('LIT', "Lit", "Shade the points with the lights and the world", 2)))
     cull_back: BoolProperty(
         name="Backface Culling", override=_OVERRIDE, default=False,
-        description="Leave out points that face away; only where the points have normals")
+        description="Hide points that face away from the camera. Needs normals")
     analysis: EnumProperty(
         name="Analysis", override=_OVERRIDE, default='AUTO',
-        description="Whether Patina finds out from each point's neighbors how wide, how thick and which way the surface is there",
+        description="When to compute the footprint, thickness, normal and trust of each point from its neighbors",
         items=(
-            ('AUTO', "Automatic", "In the background, once; not for sequences and points that move, which would be analyzed in "
-                                  "every frame, nor for range images, which need none", 0),
-            ('ALWAYS', "Always", "Sequences and points that move too, in every frame", 1),
-            ('OFF', "Off", "Nothing is computed ahead: one spacing holds for many points", 2)))
+            ('AUTO', "Automatic", "Once, in the background. Not for sequences and deforming points, which would need it in each frame, and not for "
+                                  "range images, which do not need it", 0),
+            ('ALWAYS', "Always", "Also for sequences and deforming points, in each frame", 1),
+            ('OFF', "Off", "No analysis. One spacing is used for many points, and there is no trust", 2)))
     analysis_grid: BoolProperty(
         name="By Scan Grid", override=_OVERRIDE, default=False,
-        description="Neighbors in the rows and columns of each scan tell normals and footprints, and that a surface ends where the "
-                    "scanner saw past it: true outlines, and nothing closed across a step in depth")
+        description="Use the rows and columns of each scan for normals and footprints. Gives exact outlines, and closes no gap across a step in "
+                    "depth")
     d_min: FloatProperty(
         name="Layer Distance", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE',
         unit='LENGTH', precision=4,
-        description="Least distance between two surfaces that are told apart")
-    use_d_min: switch("d_min", _known_distance, "A fixed distance; else it follows the spacing of the points", "Set Layer Distance")
+        description="Smallest distance between two separate surfaces")
+    use_d_min: switch("d_min", _known_distance, "Use a fixed distance. Disabled: it follows the spacing of the points", "Set Layer Distance")
     radius: FloatProperty(
         name="Disc Radius", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE', unit='LENGTH',
         precision=4,
-        description="Of the discs that points are drawn as, see Render Properties > Surface")
-    use_radius: switch("radius", _known_distance, "One radius for all points; else each point's own where an attribute says so, else what "
-                                                  "its neighbors or 1.75 times the spacing of the points say. Where what lies behind shows through gaps, tick it: it "
-                                                  "begins at two spacings", "Set Disc Radius")
+        description="Radius of discs, if Surface in the Render Properties draws discs")
+    use_radius: switch("radius", _known_distance, "Use one radius for all points. Disabled: the radius attribute of each point, or what its neighbors or "
+                                                  "1.75 times the spacing suggest. Enable it if surfaces behind show through gaps", "Set Disc Radius")
     radius_attribute: StringProperty(
         name="Disc Radius Attribute", override=_OVERRIDE, search=attribute_names, search_options={'SUGGESTION'},
-        description="Point attribute of numbers, or vertex group: the radius of each point's disc; empty: where all points are "
-                    "discs, the own radius of point clouds")
+        description="Point attribute or vertex group with the radius of each disc. Empty: the radius of the point cloud, if all points are discs")
     largest_gap: FloatProperty(
         name="Largest Gap", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE', unit='LENGTH',
         precision=4,
-        description="Where points are discs none is wider than this, so that wider gaps stay open")
+        description="Largest radius of a disc. Wider gaps stay open")
     use_largest_gap: switch("largest_gap", _known_gap,
                             "Discs have a greatest width; else they are as wide as the neighbors of each point say")
     free_space: EnumProperty(
         name="Free Space", override=_OVERRIDE, default='OFF',
-        description="Points that another scan of the same file saw through: what passed by, reflections, edges that are not there; "
-                    "and surface closed between points where a scanner looked through. For clouds that know where their scanners stood",
+        description="Points that another scan of the same file saw through, such as passers-by and reflections, and filled surface that a scanner "
+                    "looked through. Needs scanner positions",
         items=(
-            ('OFF', "Off", "They are points as all others", 0),
-            ('SHOW', "Show", "They are magenta, where the points have their own colors", 1),
-            ('USE', "Hide", "They are not drawn and cast no shadow, and what lies behind closed surface is seen again. A picture takes "
-             "twice as long", 2)))
+            ('OFF', "Off", "Draw them like other points", 0),
+            ('SHOW', "Show", "Draw them in magenta, if the points have their own colors", 1),
+            ('USE', "Hide", "Hide them, and open filled surface that a scanner looked through. Takes twice as long", 2)))
     hide_stray: BoolProperty(
         name="Stray", override=_OVERRIDE, default=False,
-        description="Points that are far from what their neighbors are part of are not drawn and cast no shadow")
+        description="Hide points that are far from any surface. They cast no shadow")
     hide_uncolored: BoolProperty(
         name="Uncolored", override=_OVERRIDE, default=False,
-        description="Of points with colors, those that are quite black or have none are left out; of a cloud that is black everywhere nobody")
+        description="Hide points that are black or have no color, unless the whole cloud is black")
     hide_unclassified: BoolProperty(
         name="Unclassified", override=_OVERRIDE, default=False,
-        description="Points of the classes 0, never classified, and 1, unassigned, are not drawn and cast no shadow")
+        description="Hide points of the classes 0 (never classified) and 1 (unassigned). They cast no shadow")
     least_trust: FloatProperty(
         name="Trust", override=_OVERRIDE, default=TRUST_DEFAULT, min=0.0, max=1.0, subtype='FACTOR',
-        description="Points of less trust are not drawn and cast no shadow. Trust is the probability that a point lies on a surface, "
-                    "and is no mixed pixel or stray. At its default Patina raises it for each cloud, up to 0.84. At zero, all points are drawn")
+        description="Hide points below this trust. They cast no shadow. Trust is the probability that a point is on a surface, not a mixed pixel or "
+                    "a stray. At the default, Patina raises the limit per cloud, up to 0.84. At zero, all points are drawn")
     opacity: FloatProperty(
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
-        description="How much the surface hides of what lies behind it")
+        description="Opacity of the surface")
     opacity_attribute: StringProperty(
         name="Opacity Attribute", override=_OVERRIDE, search=attribute_names, search_options={'SUGGESTION'},
-        description="Point attribute or vertex group that opacity is multiplied by: numbers from 0 to 1, weights, yes or no, or "
-                    "the alpha of a color attribute; empty: none")
+        description="Point attribute or vertex group to multiply the opacity by: numbers from 0 to 1, weights, booleans, or the alpha of a color "
+                    "attribute. Empty: none")
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
-        description="Color of points that have none. Until it is set: the base color of their material, if they have one")
+        description="Color of points that have no color. Until it is set, the base color of their material is used, if there is one")
     linked_data: PointerProperty(  # where the file's path is kept: sync/files.py
         type=Volume, name="Linked Data", override=_OVERRIDE, options={'HIDDEN'})
     linked_file: StringProperty(
         name="Linked File", subtype='FILE_PATH', options=_PATH, get=_linked_file, set=_link_file,
-        description="Point file that is drawn in place of the object's own vertices; its points never become Blender's. "
-                    "Number signs in its name stand for digits: scan_####.ply shows a file a frame")
-    address: StringProperty(name="Address", override=_OVERRIDE, options={'HIDDEN'}, description="Of a COPC or an EPT on a server, in place of a file")
+        description="Point file to draw instead of the object's own vertices. Number signs stand for the frame number: scan_####.ply shows one file "
+                    "per frame")
+    address: StringProperty(name="Address", override=_OVERRIDE, options={'HIDDEN'}, description="Address of a COPC or EPT cloud on a server, instead "
+                                                                                                "of a file")
     stream: EnumProperty(
         name="Read", override=_OVERRIDE, default='AUTO',
-        description="When a linked COPC is read. As needed: at once seen, without conversion, analysis or stations; a picture fetches "
-                    "the points that it shows",
+        description="How linked COPC files are read. As needed: visible at once, without conversion, analysis or stations",
         items=(
             ('AUTO', "Automatic", "COPC files of 20 million points or more as needed, others whole", 0),
-            ('ON', "As Needed", "COPC files without conversion, others whole", 1),
-            ('OFF', "Whole", "Converted at the first time, analyzed, and kept", 2)))
+            ('ON', "As Needed", "COPC files without conversion, other files whole", 1),
+            ('OFF', "Whole", "Converted on first use, analyzed, and cached", 2)))
     sequence: PointerProperty(type=PatinaSequenceProperties, override=_OVERRIDE)
     points: PointerProperty(type=PatinaPointsProperties, override=_OVERRIDE)
     cast_shadows: BoolProperty(
-        name="Cast", override=_OVERRIDE, default=True, description="These points throw shadows")
+        name="Cast", override=_OVERRIDE, default=True, description="The points cast shadows")
     receive_shadows: BoolProperty(
-        name="Receive", override=_OVERRIDE, default=True, description="Shadows fall on these points")
+        name="Receive", override=_OVERRIDE, default=True, description="The points receive shadows")
     self_shadows: BoolProperty(
-        name="On Itself", override=_OVERRIDE, default=True, description="These points' shadows fall on themselves")
+        name="On Itself", override=_OVERRIDE, default=True, description="The points cast shadows on themselves")
     color_attribute: StringProperty(
         name="Color Attribute", override=_OVERRIDE,
-        description="Point attribute to take colors from; empty: the active color attribute, or a usual name")
+        description="Point attribute with colors. Empty: the active color attribute, or a common name")
     normal_attribute: StringProperty(
         name="Normal Attribute", override=_OVERRIDE,
-        description="Point attribute to take normals from; empty: the first of normal, Normal, nor, N")
+        description="Point attribute with normals. Empty: the first of normal, Normal, nor, N")
     ambient: FloatProperty(
         name="Ambient", override=_OVERRIDE, default=1.0, min=0.0, soft_max=1.0, subtype='FACTOR',
-        description="Share of the world's light")
+        description="Ambient reflection: share of the world's light")
     diffuse: FloatProperty(
         name="Diffuse", override=_OVERRIDE, default=1.0, min=0.0, soft_max=1.0, subtype='FACTOR',
-        description="Share of matt reflection")
+        description="Diffuse reflection")
     specular: FloatProperty(
         name="Specular", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='FACTOR',
-        description="Share of shiny reflection")
+        description="Specular reflection")
     shininess: IntProperty(
         name="Shininess", override=_OVERRIDE, default=32, min=1, soft_max=256,
-        description="Phong exponent: the higher, the smaller the highlight")
+        description="Phong exponent. Higher values give smaller highlights")
 
 
 def _update_passes(_group: PropertyGroup, context: Context) -> None:
@@ -349,33 +334,30 @@ def _update_passes(_group: PropertyGroup, context: Context) -> None:
 class PatinaViewLayerProperties(PropertyGroup):
     use_pass_shadow: BoolProperty(
         name="Shadow", default=False, update=_update_passes, override=_OVERRIDE,
-        description="Share of the shadow-casting lights that arrives: 1 lit, 0 in shadow")
+        description="Share of the light that reaches the surface: 1 is lit, 0 is in shadow")
     use_pass_source: BoolProperty(
         name="Source", default=False, update=_update_passes, override=_OVERRIDE,
-        description="What is scan and what is invention: 0 nothing, 1 measured, 1 + distance filled from a "
-                    "neighbor that many pixels away, negative where anti-aliasing mixed")
+        description="Origin of each pixel: 0 nothing, 1 measured, 1 + distance filled from a neighbor at that distance in pixels, negative where "
+                    "anti-aliasing mixed")
     use_pass_line: BoolProperty(
         name="Line", default=False, update=_update_passes, override=_OVERRIDE,
-        description="Share of each pixel that a line covers, of the nearest layer; without lines 0")
+        description="Share of each pixel that a line covers, in the nearest layer")
     use_pass_trust: BoolProperty(
         name="Trust", default=False, update=_update_passes, override=_OVERRIDE,
-        description="Probability that the nearest point lies on a surface, 0 to 1; 0 where nothing is, or the points were not analyzed")
+        description="Trust of the nearest point, from 0 to 1. 0 where nothing is drawn or the points were not analyzed")
     use_pass_thickness: BoolProperty(
         name="Thickness", default=False, update=_update_passes, override=_OVERRIDE,
-        description="Sigma of the nearest point's surface, in the scene's units: noise, and how far scans disagree; "
-                    "0 where nothing is, or nothing is known")
+        description="Thickness (sigma) of the nearest point's surface, in scene units: noise and disagreement of scans. 0 where it is unknown")
     use_pass_density: BoolProperty(
         name="Density", default=False, update=_update_passes, override=_OVERRIDE,
-        description="How many soft points lie before the surface, for each square of the scene's unit across the view: what an "
-                    "X-ray shows. 0 where there are none")
+        description="Number of soft points in front of the surface, per square scene unit across the view, as in an X-ray image")
     use_pass_disagreement: BoolProperty(
         name="Disagreement", default=False, update=_update_passes, override=_OVERRIDE,
-        description="How far scans lie apart where range images show them, in the scene's units, along the surface's normal: what "
-                    "registration is off by. 0 where one scan is alone, or which scan a point is of is not known")
+        description="Distance between scans along the surface normal, in scene units, for range images. Shows registration errors. 0 where one scan "
+                    "is alone")
     pass_layers: IntProperty(
         name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
-        description="Color, depth and normal of so many layers of surface, the nearest first, as passes of their own; "
-                    "layers behind opaque surfaces too")
+        description="Number of surface layers whose color, depth and normal become separate passes, nearest first, also behind opaque surfaces")
 
 
 _CLASSES = (PatinaScanProperties, PatinaPointsProperties, PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,

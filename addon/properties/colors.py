@@ -25,54 +25,54 @@ def class_name(number: int) -> str:
 class PatinaColorProperties(PropertyGroup):
     source: EnumProperty(
         name="Color Source", override=_OVERRIDE, default='OWN',
-        description="Where the color of the points comes from",
+        description="Source of the points' color",
         items=(
             ('OWN', "Own Colors", "The points' own colors", 0),
             ('FIXED', "One Color", "One color for all points", 1),
-            ('SCALAR', "Attribute", "A ramp over numbers that the points have: intensity, class, scan number", 2),
-            ('HEIGHT', "Height", "A ramp over the world's Z", 3),
-            ('OBJECT_HEIGHT', "Local Height", "A ramp over the object's own Z", 4),
-            ('DISTANCE', "Distance", "A ramp over the distance from the camera", 5)))
+            ('SCALAR', "Attribute", "Color ramp over a point attribute, such as intensity, class or scan number", 2),
+            ('HEIGHT', "Height", "Color ramp over the world's Z axis", 3),
+            ('OBJECT_HEIGHT', "Local Height", "Color ramp over the object's Z axis", 4),
+            ('DISTANCE', "Distance", "Color ramp over the distance from the camera", 5)))
     scalar: StringProperty(
-        name="Attribute", override=_OVERRIDE, description="Point attribute that the ramp is laid over")
+        name="Attribute", override=_OVERRIDE, description="Point attribute that the color ramp shows")
     contour: StringProperty(
         name="Contour Attribute", override=_OVERRIDE,
-        description="Point attribute that contour lines along an attribute follow; a ramp over an attribute brings its own")
+        description="Point attribute for contour lines along an attribute. A color ramp over an attribute uses its own")
     ramp: EnumProperty(
         name="Ramp", override=_OVERRIDE, default='VIRIDIS',
-        description="Colors from the least value to the greatest",
+        description="Colors from the smallest value to the largest",
         items=(
-            ('VIRIDIS', "Viridis", "Violet, green, yellow: even steps of lightness, safe for color-blind eyes", 0),
+            ('VIRIDIS', "Viridis", "Violet, green, yellow. Even lightness, suitable for color-blind viewers", 0),
             ('GREY', "Gray", "Black to white", 1),
             ('HEAT', "Heat", "Black, red, yellow, white", 2),
             ('SPECTRUM', "Spectrum", "Blue, green, yellow, red", 3),
             ('RELIEF', "Relief", "Water, meadow, rock, snow", 4),
-            ('DIVERGING', "Diverging", "Blue, white, red: for values around a middle", 5),
-            ('CLASSES', "LAS Classes", "A color for each class", 6),
-            ('CUSTOM', "Custom", "A color ramp of your own", 7)))
+            ('DIVERGING', "Diverging", "Blue, white, red, for values around a center", 5),
+            ('CLASSES', "LAS Classes", "One color per class", 6),
+            ('CUSTOM', "Custom", "Your own color ramp", 7)))
     texture: PointerProperty(
         name="Custom Ramp", type=bpy.types.Texture, override=_OVERRIDE,
-        description="Texture whose color ramp is taken; it may be shared by objects")
+        description="Texture that holds the color ramp. Objects can share it")
     use_range: BoolProperty(
         name="Range", override=_OVERRIDE, default=False,
-        description="The ramp reaches between the values below; else from the least to the greatest")
+        description="Use the range below. Disabled: from the smallest value to the largest")
     range_min: FloatProperty(name="From", override=_OVERRIDE, default=0.0, precision=3,
-                             description="Value at the ramp's beginning")
+                             description="Value at the start of the ramp")
     range_max: FloatProperty(name="To", override=_OVERRIDE, default=1.0, precision=3,
-                             description="Value at the ramp's end")
+                             description="Value at the end of the ramp")
     exposure: FloatProperty(
         name="Exposure", override=_OVERRIDE, default=0.0, soft_min=-5.0, soft_max=5.0, min=-32.0, max=32.0,
-        description="Brightness of the points' colors, in stops, before they are lit")
+        description="Exposure of the points' colors before lighting, in stops")
     contrast: FloatProperty(
         name="Contrast", override=_OVERRIDE, default=1.0, min=0.01, soft_min=0.2, soft_max=3.0, max=16.0,
-        description="Contrast of the points' colors around mid gray")
+        description="Contrast of the points' colors around middle gray")
     class_attribute: StringProperty(
         name="Classes", override=_OVERRIDE,
-        description="Point attribute that holds the points' classes; empty: class or classification")
+        description="Point attribute with the classes. Empty: class or classification")
     hidden: BoolVectorProperty(
         name="Hidden Classes", override=_OVERRIDE, size=CLASSES, default=(False,) * CLASSES,
-        description="Points of this class are not drawn and cast no shadow")
+        description="Hide points of this class. They cast no shadow")
     hidden_more: StringProperty(
-        name="Others", override=_OVERRIDE, description="Further classes to hide, up to 255: 64, 70-79")
+        name="Others", override=_OVERRIDE, description="More classes to hide, up to 255, such as 64, 70-79")
     use_clips: BoolProperty(
-        name="Clip", override=_OVERRIDE, default=True, description="Clip boxes and planes cut these points")
+        name="Clip", override=_OVERRIDE, default=True, description="Clip boxes and planes clip these points")

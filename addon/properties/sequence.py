@@ -15,14 +15,14 @@ class PatinaSequenceProperties(PropertyGroup):
 
     start: IntProperty(
         name="Start Frame", override=_OVERRIDE, default=1,
-        description="Frame at which the file with the least number shows")
+        description="Frame that shows the file with the lowest number")
     step: IntProperty(
         name="Frames per File", override=_OVERRIDE, default=1, min=1, soft_max=100,
-        description="How many frames a file stays")
+        description="Number of frames per file")
     outside: EnumProperty(
         name="Outside", override=_OVERRIDE, default='HOLD',
-        description="What shows before the first file and after the last",
+        description="What to show before the first and after the last file",
         items=(
             ('HOLD', "Hold", "The first or the last file", 0),
-            ('LOOP', "Loop", "The files over and over", 1),
-            ('HIDE', "Hide", "Nothing", 2)))
+            ('LOOP', "Loop", "Repeat the files", 1),
+            ('HIDE', "Hide", "Show nothing", 2)))

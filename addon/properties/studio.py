@@ -15,41 +15,40 @@ _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 class PatinaStudioProperties(PropertyGroup):
     use_light: BoolProperty(
         name="Studio Light", override=_OVERRIDE, default=False,
-        description="One large light and an even one light the points, in place of the scene's lights and the world")
+        description="Light the points with one large light and ambient light, instead of the scene's lights and the world")
     azimuth: FloatProperty(
         name="Azimuth", override=_OVERRIDE, default=radians(-45), min=radians(-180), max=radians(180), subtype='ANGLE',
-        description="Where the light stands, around the vertical: 0 behind the camera, negative to its left")
+        description="Direction of the light around the vertical. 0 is behind the camera, negative is to its left")
     height: FloatProperty(
         name="Height", override=_OVERRIDE, default=radians(45), min=radians(-90), max=radians(90), subtype='ANGLE',
-        description="How high the light stands above the horizon")
+        description="Height of the light above the horizon")
     follow_camera: BoolProperty(
         name="Follow Camera", override=_OVERRIDE, default=True,
-        description="The light turns with the scene's camera; else azimuth 0 is the direction -Y")
+        description="The light follows the scene's camera. Disabled: azimuth 0 is the direction -Y")
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(1.0, 1.0, 1.0), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
         description="Color of the light")
     strength: FloatProperty(
         name="Strength", override=_OVERRIDE, default=3.0, min=0.0, soft_max=10.0,
-        description="Watts a square meter, as of Blender's suns: at 3.14 a surface that faces the light shows its own color")
+        description="Strength in watts per square meter, as in Blender's sun lights. At 3.14 a surface that faces the light shows its own color")
     angle: FloatProperty(
         name="Size", override=_OVERRIDE, default=radians(20), min=0.0, max=radians(90), subtype='ANGLE',
-        description="Angle that the light spans: the larger, the softer its shadows")
+        description="Angular size of the light. Larger lights have softer shadows")
     fill: FloatProperty(
         name="Fill", override=_OVERRIDE, default=0.25, min=0.0, max=1.0, subtype='FACTOR',
-        description="Strength of a second light from the other side, without shadows, as a share of the first")
+        description="Strength of a fill light from the other side, without shadows, as a share of the first light")
     ambient: FloatVectorProperty(
         name="Ambient", override=_OVERRIDE, default=(0.1, 0.1, 0.1), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Light from everywhere")
+        description="Strength of the light from all directions")
     use_headlight: BoolProperty(
         name="Headlight", override=_OVERRIDE, default=False,
-        description="A light shines from the camera or the view, beside the other lights and without shadows, on all points that "
-                    "are lit: scans without colors are seen from everywhere")
+        description="Add a light at the camera or viewpoint, without shadows, that lights all lit points")
     headlight: FloatProperty(
         name="Strength", override=_OVERRIDE, default=3.0, min=0.0, soft_max=10.0,
-        description="Watts a square meter, as of Blender's suns: at 3.14 a surface that faces the camera shows its own color")
+        description="Strength in watts per square meter, as in Blender's sun lights. At 3.14 a surface that faces the camera shows its own color")
     use_background: BoolProperty(
         name="Background", override=_OVERRIDE, default=False,
-        description="A color of its own lies behind the points, in place of the world's")
+        description="Use a background color instead of the world")
     background: FloatVectorProperty(
         name="Background Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Color behind the points")
+        description="Background color")

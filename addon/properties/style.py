@@ -40,12 +40,12 @@ def _apply(group: PatinaStyleProperties, _context: Context) -> None:
 class PatinaStyleProperties(PropertyGroup):
     chosen: EnumProperty(
         name="Style", items=_list, get=_chosen, set=_choose, update=_apply, options=set(),
-        description="How the points look: lines, light, colors and background at once")
+        description="Look of the points: lines, light, colors and background")
     objects: EnumProperty(
         name="Apply To", default='ALL', options=set(),
-        description="Which objects a chosen style changes, beside the scene",
+        description="Objects that a style changes, in addition to the scene",
         items=(
-            ('ALL', "All Points", "Every object of the scene that Patina draws", 0),
-            ('SELECTED', "Selected", "Selected objects only: others keep their colors and lighting", 1)))
+            ('ALL', "All Points", "All objects of the scene that Patina draws", 0),
+            ('SELECTED', "Selected", "Only selected objects. Others keep their colors and lighting", 1)))
     applied: StringProperty(options={'HIDDEN'})
     notice: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})

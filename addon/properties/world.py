@@ -14,7 +14,7 @@ _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 class PatinaWorldProperties(PropertyGroup):
     use_picture: BoolProperty(
         name="Use Picture", override=_OVERRIDE, default=True,
-        description="The picture stands for the world's nodes, as light and behind the points")
+        description="Use the image instead of the world's nodes, as light and as background")
     picture: PointerProperty(
         name="Picture", type=bpy.types.Image, override=_OVERRIDE,
-        description="The world all around, as Bake World makes it: for nodes that Patina does not know, such as Sky Texture")
+        description="Panorama of the world from Bake World, for nodes that Patina cannot evaluate, such as Sky Texture")

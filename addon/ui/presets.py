@@ -18,7 +18,7 @@ SHIPPED = Path(__file__).resolve().parents[1] / "presets/render"
 
 
 class PATINA_OT_preset_add(AddPresetBase, Operator):
-    """Save the surface settings under a name, or remove the chosen preset"""
+    """Save the surface settings as a preset, or remove the chosen preset"""
 
     bl_idname = "render.patina_preset_add"
     bl_label = "Patina Preset"
