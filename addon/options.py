@@ -38,7 +38,7 @@ def read(arguments: Sequence[str] | None = None) -> dict[str, str | int | float]
 def _value(name: str, value: str) -> str | int | float:
     if name in SWITCHES:
         if value:
-            raise PatinaError(f"{_PREFIX}{name} '{value}': it takes no value", -1)
+            raise PatinaError(f"{_PREFIX}{name} '{value}': it does not take a value", -1)
         return 1
     choices = {"device": DEVICES, "quality": QUALITIES}.get(name)
     if choices:

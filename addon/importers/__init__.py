@@ -41,7 +41,7 @@ def reader(path: Path) -> ModuleType:
     if path.suffix.lower() in PACKED_SPLATS:
         raise PatinaError(f"packed Gaussian splats ({path.suffix}) are not read: convert them to a PLY, as SuperSplat exports it", -5)
     if path.name.lower() == "ept.json":
-        raise PatinaError("the points of EPT folders are read as pictures want them, not whole: turn Link on", -5)
+        raise PatinaError("EPT folders can only be linked. Enable Link", -5)
     if name is None:
         raise PatinaError(f"'{path.suffix}' is none of {' '.join(FORMATS)}", -5)
     regular(path)  # raises where it is no file

@@ -154,7 +154,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             raise
         raise native.PatinaError(str(error).replace(f"{path.name}: ", f"{path.name}: scan {index}: ", 1), error.code) from None
     except MemoryError:
-        raise native.PatinaError(f"{path.name}: scan {index}: memory is short for its points", -2) from None
+        raise native.PatinaError(f"{path.name}: scan {index}: not enough memory for its points", -2) from None
     finally:
         file.close()
     if failed and not parts:

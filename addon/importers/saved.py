@@ -25,5 +25,5 @@ def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
 
 
 def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
-    raise native.PatinaError(f"{path.name}: a saved cloud is linked and drawn from where it lies; its points are not read into Blender", -5)
+    raise native.PatinaError(f"{path.name}: a saved cloud can only be linked, not imported", -5)
     yield

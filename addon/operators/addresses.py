@@ -55,7 +55,7 @@ class PATINA_OT_import_address(Stepped, Operator):
         styles.dress(context.scene, obj)
         context.view_layer.objects.active = obj
         count = found.cloud.count
-        self.report({'INFO'}, f"Opened {count:,} point{'s' * (count != 1)}: they are fetched as pictures show them")
+        self.report({'INFO'}, f"Opened {count:,} point{'s' * (count != 1)}. They are downloaded as views show them")
         return {'FINISHED'}
 
 

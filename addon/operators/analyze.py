@@ -81,7 +81,7 @@ class PATINA_OT_analyze(Stepped, Operator):
             yield task
             task.result()
         except native.PatinaCancelled:
-            self.report({'INFO'}, "Patina: nothing was written, for it was ended before")
+            self.report({'INFO'}, "Patina: canceled. Nothing was written")
             return {'CANCELLED'}
         except native.PatinaError as error:
             self.report({'ERROR'}, f"Patina: {error}")
@@ -152,7 +152,7 @@ class PATINA_OT_frame_points(Operator):
         far = max((corner - place).length for corner in corners)
         if camera.data.clip_end < far:
             camera.data.clip_end = 1.2 * far
-            self.report({'INFO'}, f"Patina: the camera sees as far as {camera.data.clip_end:.4g} now")
+            self.report({'INFO'}, f"Patina: set the camera's Clip End to {camera.data.clip_end:.4g}")
 
 
 def _move_views(context: Context, corners: list[Vector]) -> None:

@@ -153,7 +153,7 @@ class PATINA_OT_scans_balance(scans.OfScans, Operator):
         group.use_balance = len(balance.alone) < len(found.numbers)
         if balance.alone:
             names = ", ".join(by_number[found.numbers[index]].name for index in balance.alone[:5])
-            self.report({'WARNING'}, f"Patina: '{obj.name}': {names}{', ...' * (len(balance.alone) > 5)}: overlap no other scan, and stay as they are")
+            self.report({'WARNING'}, f"Patina: '{obj.name}': {names}{', ...' * (len(balance.alone) > 5)}: overlap no other scan and were not changed")
         if not group.use_balance:
             return {'CANCELLED'}
         spread = balance.gains.max(axis=0) / balance.gains.min(axis=0)

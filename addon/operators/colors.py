@@ -59,7 +59,7 @@ class PATINA_OT_robust_range(_ColorOperator, Operator):
             self.report({'ERROR'}, f"Patina: {error}")
             return {'CANCELLED'}
         if found is None:
-            self.report({'WARNING'}, "There is nothing to take a range of")
+            self.report({'WARNING'}, "There are no values to take a range from")
             return {'CANCELLED'}
         group.range_min, group.range_max = found
         group.use_range = True

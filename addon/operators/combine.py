@@ -35,7 +35,7 @@ class PATINA_OT_combine(Operator):
         try:
             scene.render.engine = 'CYCLES' if self.engine == 'CYCLES' else eevee
         except TypeError:
-            self.report({'ERROR'}, f"Patina: this Blender has no {self.engine}: its add-on is switched off")
+            self.report({'ERROR'}, f"Patina: this Blender has no {self.engine}: its add-on is disabled")
             return {'CANCELLED'}
         if self.engine == 'CYCLES' and scene.cycles.use_denoising and not _denoises():
             scene.cycles.use_denoising = False  # else F12 ends with an error and no picture

@@ -80,7 +80,7 @@ class PATINA_OT_send_to_farm(Operator):
             return {'CANCELLED'}
         self.command = f"python3 {shlex.quote(str(folder / 'slurm.py'))}"
         context.window_manager.clipboard = self.command
-        self.report({'INFO'}, f"The job is written. Slurm: {self.command} (in the clipboard); for others see {folder / 'README.txt'}")
+        self.report({'INFO'}, f"Wrote the job. Slurm: {self.command} (in the clipboard); for others see {folder / 'README.txt'}")
         return {'FINISHED'}
 
 

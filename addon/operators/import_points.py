@@ -171,7 +171,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
     def _ended(self, found: list[bpy.types.ID]) -> set[str]:
         for data in found:
             (bpy.data.meshes if isinstance(data, bpy.types.Mesh) else bpy.data.pointclouds).remove(data)
-        self.report({'INFO'}, "Patina: nothing was imported, for it was ended before")
+        self.report({'INFO'}, "Patina: import canceled. Nothing was imported")
         return {'CANCELLED'}
 
     def _add(self, context: Context, obj: bpy.types.Object, own: origin.Origin, units: Sequence[float]) -> None:

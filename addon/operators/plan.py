@@ -80,7 +80,7 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
             self.report({'ERROR'}, f"Patina: {target.name} cannot be written: {error.strerror}")
             return {'CANCELLED'}
         self.report({'INFO'}, f"{width:,} x {height:,} pixels of {pixel:.6g} units; world file {target.name}. "
-                            f"The scene's camera is '{camera.name}' now, its picture of this size")
+                            f"The scene now uses the camera '{camera.name}' and this resolution")
         return {'FINISHED'}
 
 

@@ -38,7 +38,7 @@ def cloud_of(obj: Object, context: Context) -> native.Cloud:
     if source is None:
         raise native.PatinaError(notices[0] if notices else "the file is missing")
     if source.streamed:
-        raise native.PatinaError("its points are read as needed: Linked File > Read Whole has all of them")
+        raise native.PatinaError("its points are read as needed. Use Linked File > Read Whole to read all of them")
     return jobs.finish(clouds.CACHE.obtain_linked(source, importers.Progress()))
 
 
@@ -91,7 +91,7 @@ class Editing:
         try:
             return edits.for_cloud(edits.packed_of(obj), cloud.count) or edits.none(cloud.count)
         except edits.Damaged as damaged:
-            self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}: begun anew")
+            self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}. The edits were reset")
             return edits.none(cloud.count)
 
     def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits | None:
@@ -165,7 +165,7 @@ class PATINA_OT_points_select_by(Editing, Operator):
         scans = edits.scans_of(cloud)
         if scans is None or self.number not in cloud.scan_numbers:
             raise native.PatinaError(f"no point is of scan {self.number}" if cloud.scan_numbers else
-                                     "the file does not say which scans its points are of")
+                                     "the file does not store the scan of each point")
         found = edits.of_flags(scans == cloud.scan_numbers.index(self.number))
         return found & drawn_alone(context, obj, cloud, lambda scene: pick(scene, 0, None))
 

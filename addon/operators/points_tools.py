@@ -52,7 +52,7 @@ class PATINA_OT_points_select(OverView, Operator):
     def execute(self, context: Context) -> set[str]:
         outline = self._outline()
         if outline is None:
-            self.report({'ERROR'}, "Patina: an outline has at least three corners, a box two")
+            self.report({'ERROR'}, "Patina: an outline needs at least three corners, a box two")
             return {'CANCELLED'}
         objects = targets(context)
         try:
@@ -74,7 +74,7 @@ class PATINA_OT_points_select(OverView, Operator):
             try:
                 old = edits.for_cloud(edits.packed_of(obj), count) or edits.none(count)
             except edits.Damaged as damaged:
-                self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}: begun anew")
+                self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}. The edits were reset")
                 old = edits.none(count)
             new = replace(old, selected=points.combine(self.how, old.selected, bits))
             points.write(obj, new)
@@ -95,7 +95,7 @@ class PATINA_OT_points_select(OverView, Operator):
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         if not is_view(context):
-            self.report({'ERROR'}, "Patina: points are selected in a 3D view")
+            self.report({'ERROR'}, "Patina: use this tool in a 3D viewport")
             return {'CANCELLED'}
         self._corners: list[Place] = []
         self._place = place_of(context, event)

@@ -34,7 +34,7 @@ class _Installing(Stepped):
             self.report({'ERROR'}, importers.told(f"Patina: {error}"))
             return {'CANCELLED'}
         except native.PatinaCancelled:
-            self.report({'INFO'}, "Patina: nothing was installed, for it was ended before")
+            self.report({'INFO'}, "Patina: installation canceled. Nothing was installed")
             return {'CANCELLED'}
         finally:
             what.close()
@@ -42,7 +42,7 @@ class _Installing(Stepped):
         if lacking:
             self.report({'WARNING'}, f"Patina: still missing: {', '.join(lacking)}. {readers.WITHOUT}")
         else:
-            self.report({'INFO'}, "LAZ, COPC and E57 can be read now")
+            self.report({'INFO'}, "Installed the readers of LAZ, COPC and E57")
         return {'FINISHED'}
 
     def execute(self, context: Context) -> set[str]:

@@ -86,7 +86,7 @@ class PATINA_OT_set_up(Operator):
             self.report({'INFO'}, text)
         if unlit(scene, points):
             scene.patina.studio.use_headlight = True
-            self.report({'INFO'}, "No lamp reaches the points: the headlight shines from the camera, on those without colors of their own")
+            self.report({'INFO'}, "No light reaches the points. Enabled the headlight for points without colors")
         return {'FINISHED'}
 
 
@@ -103,7 +103,7 @@ def offer(context: Context) -> None:
     """Asks, once the points are there, and goes away by itself."""
     def draw(self: bpy.types.Menu, _context: Context) -> None:
         self.layout.operator(PATINA_OT_set_up.bl_idname, icon='RESTRICT_RENDER_OFF')
-        self.layout.label(text="Engine, camera and light, for the points alone")
+        self.layout.label(text="Set the engine, camera and light for point clouds")
 
     context.window_manager.popup_menu(draw, title="Render with Patina?", icon='QUESTION')
 

@@ -55,7 +55,7 @@ class PATINA_OT_soft_brush(OverView, Operator):
         except (native.PatinaError, sync.CameraError) as error:
             return self._refused(str(error))
         if not stroke.bits.any():
-            self.report({'INFO'}, "The view shows no points of the object there")
+            self.report({'INFO'}, "There are no points of the object here")
             return {'CANCELLED'}
         write(obj, stroke.bits, self.strength)
         return {'FINISHED'}
@@ -174,7 +174,7 @@ class PATINA_OT_soft_brush(OverView, Operator):
         met = int(np.unpackbits(self._stroke.bits).sum())
         if met:
             bpy.ops.ed.undo_push(message=self.bl_label)
-        self._tell(context, f"{met:,} points painted. " if met else "The view shows no points of the object there. ")
+        self._tell(context, f"{met:,} points painted. " if met else "There are no points of the object here. ")
         self._drop(context)
 
     def _drop(self, context: Context) -> None:

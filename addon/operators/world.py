@@ -56,7 +56,7 @@ class PATINA_OT_bake_world(Operator):
         world.patina.use_picture = True
         if before and before.packed_file and not before.users:
             bpy.data.images.remove(before)
-        self.report({'INFO'}, f"'{image.name}' stands for the nodes of '{world.name}' now; bake again after changing these")
+        self.report({'INFO'}, f"Baked the nodes of world '{world.name}' to image '{image.name}'. Bake again after editing them")
         return {'FINISHED'}
 
     def _render(self, scene: bpy.types.Scene, eye: bpy.types.Object, world: bpy.types.World, path: Path) -> None:

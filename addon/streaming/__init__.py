@@ -76,7 +76,7 @@ class Stream:
             self._process = subprocess.Popen([*programs.command(Path(__file__).with_name("reader.py")), self._folder.name],
                                              stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         except OSError as error:
-            raise native.PatinaError(f"{place}: the process that reads does not start: {error.strerror}", -3) from None
+            raise native.PatinaError(f"{place}: the reading process does not start: {error.strerror}", -3) from None
         self._finalizer = weakref.finalize(self, _finish, self._process, self._folder)
         self._say({"place": place, "scalar": scalar, "workers": min(os.cpu_count() or 1, 8), "timeout": TIMEOUT, "wait": WAIT,
                    "keep": keep and {"folder": str(keep.folder), "bytes": keep.bytes}, "offline": offline})

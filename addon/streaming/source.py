@@ -286,7 +286,7 @@ def _total(told: str, first: int, last: int) -> int | None:
     """Of the file that a part is of, by its Content-Range."""
     found = re.fullmatch(r"bytes ([0-9]{1,18})-([0-9]{1,18})/([0-9]{1,18}|\*)", told[:100].strip())
     if not found or (int(found[1]), int(found[2])) != (first, last):
-        raise SourceError(f"the server sent another part than was asked for ('{web._plain(told)}')")
+        raise SourceError(f"the server sent a different part than requested ('{web._plain(told)}')")
     return None if found[3] == "*" else int(found[3])
 
 

@@ -98,13 +98,13 @@ def _check(camera: bpy.types.Object) -> None:
     """CameraError for one that animation or a script gave values by which nothing can be seen."""
     data = camera.data
     if data.type == 'ORTHO' and not data.ortho_scale > 0.0:
-        raise CameraError(f"'{camera.name}' sees nothing: its orthographic scale is {data.ortho_scale:g}")
+        raise CameraError(f"'{camera.name}' cannot see anything: its orthographic scale is {data.ortho_scale:g}")
     if data.type == 'PERSP' and not (math.isfinite(data.lens) and data.sensor_width > 0.0 and data.sensor_height > 0.0):
-        raise CameraError(f"'{camera.name}' sees nothing: its field of view is 0")
+        raise CameraError(f"'{camera.name}' cannot see anything: its field of view is 0")
     if not data.clip_end > data.clip_start:
-        raise CameraError(f"'{camera.name}' sees nothing: Clip End, {data.clip_end:g}, is not beyond Clip Start, {data.clip_start:g}")
+        raise CameraError(f"'{camera.name}' cannot see anything: Clip End, {data.clip_end:g}, is not beyond Clip Start, {data.clip_start:g}")
     if not abs(camera.matrix_world.to_3x3().determinant()) > 0.0:
-        raise CameraError(f"'{camera.name}' sees nothing: its scale is 0")
+        raise CameraError(f"'{camera.name}' cannot see anything: its scale is 0")
 
 
 def _panoramic(camera: bpy.types.Object, render: bpy.types.RenderSettings, place: Matrix) -> View:

@@ -254,7 +254,7 @@ def _opened(source: Source) -> Linked | None:
     try:
         found = _linked(native.Cloud.open(source.kept), *kept.read_notes(source.kept.with_suffix(".json")), source.kept)
         if found.scans and found.cloud.scan_file.stat().st_size != 2 * found.cloud.count:
-            raise ValueError("which scans the points are of is damaged")
+            raise ValueError("the list of scans is damaged")
         with contextlib.suppress(OSError):  # of another user
             os.utime(source.kept)  # used just now
         kept.CHECKS.start(source.identity(), source.kept)

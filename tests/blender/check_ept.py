@@ -178,6 +178,6 @@ def test_ept_is_not_imported_whole():
     try:
         bpy.ops.import_scene.patina_points(filepath=str(folder / "ept.json"))
     except RuntimeError as error:
-        check("turn Link on" in str(error), str(error))
+        check("Enable Link" in str(error), str(error))
     else:
         check(False, "it was imported")
