@@ -15,7 +15,7 @@ import time
 import traceback
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parent.parent)]
 
 MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "check_layers", "check_shadows", "check_final",
            "check_samples", "check_plan", "check_color", "check_clip", "check_panels", "check_styles", "check_import", "check_formats",
@@ -67,6 +67,7 @@ def work():
 def main():
     import harness
     import setting
+    from names import chosen
     names = wanted_names()
     left_out = {name: [] for name in names if name in CHOICES}
     part, parts = next((map(int, name[len("--part="):].split("/")) for name in names if name.startswith("--part=")), (1, 1))
@@ -75,14 +76,14 @@ def main():
     setting.say(", ".join([kinds.get(tuple(names), "named tests"), *(CHOICES[choice][2] for choice in left_out)]), (part, parts),
                 whole=tuple(names) in kinds)
     passed = failed = skipped = 0
-    labels, took = [], []
-    for place, module in enumerate(map(importlib.import_module, MODULES)):  # all, in each part
-        for name, test in list(vars(module).items()):
-            if not name.startswith("test_"):
-                continue
-            label = f"{module.__name__[len('check_'):]}/{name[len('test_'):]}"
-            labels.append(label)
-            if place % parts != part - 1 or names and not any(word in name for word in names):
+    took = []
+    modules = [[(f"{module.__name__[len('check_'):]}/{name[len('test_'):]}", test) for name, test in vars(module).items() if name.startswith("test_")]
+               for module in map(importlib.import_module, MODULES)]  # all, in each part
+    labels = [label for tests in modules for label, _ in tests]
+    wanted = set(chosen(labels, names))
+    for place, tests in enumerate(modules):
+        for label, test in tests:
+            if place % parts != part - 1 or label not in wanted:
                 continue
             choice = next((choice for choice in left_out if CHOICES[choice][0](label)), None)
             if choice:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parent.parent)]
 
 PATIENCE = 120.0  # s of a wait, after which nothing comes any more, on a machine that others load too
 ALONE = {"newcomers_clicks"}  # run by their names only: they want Blender as it comes, and not as other tests left its window
@@ -54,22 +54,25 @@ def tests():
     import check_viewport
     import check_viewport_life
     import check_viewport_samples
+    from names import chosen as by_words
     names = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     chosen, run = CHOICES[names.pop(0)] if names and names[0] in CHOICES else (None, "window tests")
     setting.say("the manual's clicks" if names == ["newcomers_clicks"] else run, whole=not names or names == ["newcomers_clicks"])
     if names == ["long_session"]:
         import session_rounds
         yield "long_session", session_rounds.long_session
+        return
     if names == ["figures"]:
         import figures
         yield "figures", figures.orbit_figures
+        return
     modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_view_copc, check_view_edits, check_newcomer)
     known = {name.removeprefix("test_"): test for module in modules for name, test in vars(module).items() if name.startswith("test_")}
     wrong = sorted((ONCE | DRAWN | ALONE) - set(known))
     assert not wrong, f"lists of test_window.py: no test is called {', '.join(wrong)}"
-    for name, test in known.items():
-        if any(part in name for part in names) if names else name not in ALONE and (not chosen or chosen(name)):
-            yield name, test
+    for name in by_words(known, names):
+        if names or name not in ALONE and (not chosen or chosen(name)):
+            yield name, known[name]
 
 
 class Runner:

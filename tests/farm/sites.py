@@ -2,9 +2,13 @@
 """What the farm's tests draw, and how they run a program. Python's own library only."""
 import random
 import subprocess
+import sys
 import traceback
 from math import cos, pi, sin
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from names import chosen  # noqa: E402
 
 
 def run(*arguments, code=0, cwd=None, env=None, timeout=300):
@@ -35,8 +39,9 @@ def write_site(path: Path, count: int = 30000, seed: int = 3) -> Path:
 def run_tests(tests: dict, names: list = ()) -> int:
     """Every function test_*, or those whose names hold one of these; the closing line is the count."""
     failed = skipped = 0
-    found = {name: test for name, test in tests.items() if name.startswith("test_") and (not names or any(part in name for part in names))}
-    for name, test in found.items():
+    found = chosen([name for name in tests if name.startswith("test_")], names)
+    for name in found:
+        test = tests[name]
         try:
             reason = test()
         except Exception:

@@ -8,18 +8,20 @@ import time
 import traceback
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from names import chosen  # noqa: E402
+
 
 class Skip(Exception):
     pass
 
 
 def run_tests(tests, *scratch):
-    """tests: what the script's names mean; those that begin with test_ run, or which the arguments are a part of. Then removes the folders
-    and ends the process, whatever threads are left."""
+    """Runs the functions of tests, a dictionary by name, whose names begin with test_ and contain one of the script's arguments. Then removes
+    the folders and ends the process, whatever threads are left."""
     passed = failed = skipped = 0
-    for name, test in list(tests.items()):
-        if not name.startswith("test_") or not callable(test) or sys.argv[1:] and not any(word in name for word in sys.argv[1:]):
-            continue
+    for name in chosen([name for name, test in tests.items() if name.startswith("test_") and callable(test)], sys.argv[1:]):
+        test = tests[name]
         start = time.perf_counter()
         try:
             test()

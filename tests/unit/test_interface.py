@@ -25,8 +25,9 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "addon/native"))
+sys.path[:0] = [str(ROOT / "addon/native"), str(ROOT / "tests")]
 import abi  # noqa: E402
+from names import chosen  # noqa: E402
 
 POINTS, ROOM, SIDE = 64, 64 * 64, 16  # arrays are wider than their count, so that another type or stride reads what is there
 SECONDS = 300  # that a function may take with all of its cases
@@ -563,9 +564,7 @@ def main() -> int:
     assert not missing, f"declarations that were not understood: {missing}"
     passed = failed = cases = 0
     start = time.monotonic()
-    for function in [*all_of_them, "orders"]:
-        if wanted and function not in wanted:
-            continue
+    for function in chosen([*all_of_them, "orders"], wanted):
         good, told = try_alone(library, function, all_of_them)
         passed, failed = passed + good, failed + (not good)
         cases += int(told) if good else 0

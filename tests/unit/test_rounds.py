@@ -10,6 +10,9 @@ import tempfile
 import traceback
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from names import chosen  # noqa: E402
+
 PATINA, TOWN = (str(Path(path).resolve()) for path in sys.argv[1:3])
 FOLDER = Path()  # a temporary one, set by main
 ACROSS, QUARTER = 7, 400_000  # quarters a side, points of each
@@ -105,18 +108,17 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         FOLDER = Path(folder)
         subprocess.run([TOWN, FOLDER / "town.cloud", str(ACROSS), str(QUARTER)], check=True, stdout=subprocess.DEVNULL)
-        for name, test in list(globals().items()):
-            if name.startswith("test_"):
-                try:
-                    test()
-                    passed += 1
-                    print(f"ok   {name}")
-                except Skip as reason:
-                    skipped += 1
-                    print(f"skip rounds/{name.removeprefix('test_')}: {reason}")
-                except Exception:
-                    failed += 1
-                    print(f"FAIL {name}\n{traceback.format_exc()}")
+        for name in chosen([name for name in globals() if name.startswith("test_")], sys.argv[3:]):
+            try:
+                globals()[name]()
+                passed += 1
+                print(f"ok   {name}")
+            except Skip as reason:
+                skipped += 1
+                print(f"skip rounds/{name.removeprefix('test_')}: {reason}")
+            except Exception:
+                failed += 1
+                print(f"FAIL {name}\n{traceback.format_exc()}")
     print(f"{passed} passed, {failed} failed, {skipped} skipped")
     sys.exit(failed > 0)
 

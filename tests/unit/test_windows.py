@@ -14,6 +14,9 @@ import time
 import traceback
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from names import chosen  # noqa: E402
+
 PATINA, HERE = (str(Path(argument).resolve()) for argument in sys.argv[1:3])
 FOLDER = Path()  # a temporary one, set by main
 WINESERVER = shutil.which("wineserver") or "/usr/lib/wine/wineserver64"
@@ -191,22 +194,20 @@ def compare_keys(screen):
 def main():
     global FOLDER
     passed = failed = skipped = 0
-    wanted = sys.argv[3:]
-    for name, test in list(globals().items()):
-        if name.startswith("test_") and (not wanted or any(word in name for word in wanted)):
-            with tempfile.TemporaryDirectory() as scratch:
-                FOLDER = Path(scratch)
-                try:
-                    test()
-                except Skip as reason:
-                    skipped += 1
-                    print(f"skip {name}: {reason}", flush=True)
-                except Exception:  # noqa: BLE001
-                    failed += 1
-                    print(f"FAILED {name}\n{traceback.format_exc()}", flush=True)
-                else:
-                    passed += 1
-                    print(f"ok {name}", flush=True)
+    for name in chosen([name for name in globals() if name.startswith("test_")], sys.argv[3:]):
+        with tempfile.TemporaryDirectory() as scratch:
+            FOLDER = Path(scratch)
+            try:
+                globals()[name]()
+            except Skip as reason:
+                skipped += 1
+                print(f"skip {name}: {reason}", flush=True)
+            except Exception:  # noqa: BLE001
+                failed += 1
+                print(f"FAILED {name}\n{traceback.format_exc()}", flush=True)
+            else:
+                passed += 1
+                print(f"ok {name}", flush=True)
     print(f"{passed} passed, {failed} failed, {skipped} skipped")
     return failed != 0
 
