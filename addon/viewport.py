@@ -146,6 +146,7 @@ class Viewport:
         self._frame: tuple[native.Device, native.Frame] | None = None
         self._others: list[tuple[native.Device, native.Frame]] = []  # for mattes
         self._dots: tuple[native.Device, native.Frame] | None = None  # for what the picture leaves out
+        self.measures = False  # the statistics show the time of each pass
         self._sky = sky.Sky()
         self._bettered: Bettered | None = None  # what is shown, while samples of it are pending
         self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture | None] | None = None  # colour; depth for overlays
@@ -504,6 +505,7 @@ class Viewport:
         if self._frame is None or self._frame[0] is not device:
             self._frame = (device, native.Frame(device))
         frame, settings = self._frame[1], description.settings
+        frame.measure(self.measures)
         x0, y0, x1, y1 = settings.region
         parts, spare = [(frame, description)], self._spare
         if mattes.are_needed(description):

@@ -98,12 +98,35 @@ struct pt_bound_pass {
     size_t argument_size;
 };
 
+// What a device was asked to do since it was made: frames report differences.
+struct pt_counts {
+    // OpenGL. empty: dispatches without a workgroup (direct ones; indirect ones of frames that are measured). copies: of buffers to
+    // buffers, and uploads into parts of buffers. waits: calls that block until submitted work is done.
+    uint64_t dispatches, empty, barriers, calls, copies, waits;
+    uint64_t steps; // processor: steps of its threads, each of which ends with a barrier
+};
+
+// What was asked between two counts.
+static inline struct pt_counts pt_counts_between(const struct pt_counts *before, const struct pt_counts *after)
+{
+    return (struct pt_counts){.dispatches = after->dispatches - before->dispatches,
+                              .empty = after->empty - before->empty,
+                              .barriers = after->barriers - before->barriers,
+                              .calls = after->calls - before->calls,
+                              .copies = after->copies - before->copies,
+                              .waits = after->waits - before->waits,
+                              .steps = after->steps - before->steps};
+}
+
 // Passes that run as one, or a single one, of several that follow each other.
 struct pt_group {
     const struct pt_bound_pass *passes;
     uint32_t count;
-    float done; // the progress, once it is handed to the driver
-    double ms;  // out: that it took
+    float done;              // the progress, once it is handed to the driver
+    uint64_t bytes;          // that it reads and writes, by the plan
+    double ms;               // out: that it took, with those that follow it and have `joined`
+    int joined;              // out: its time is in that of a group before it
+    struct pt_counts counts; // out: what it asked of the device
 };
 
 // How a buffer is made of what is given.
@@ -121,14 +144,6 @@ struct pt_ranges {
     uint64_t failed; // bytes of clouds that the driver had no memory for; 0: it never came to that
     uint64_t read;   // out: bytes of points, in ranges
     uint32_t rounds; // out: ranges that the kernel took that took most
-};
-
-// What a device was asked to do since it was made: frames report differences.
-struct pt_counts {
-    // OpenGL. empty: dispatches without a workgroup (direct ones; indirect ones where device_gl/count.c is told to look). copies: of buffers to
-    // buffers, and uploads into parts of buffers. waits: calls that block until submitted work is done.
-    uint64_t dispatches, empty, barriers, calls, copies, waits;
-    uint64_t steps; // processor: steps of its threads, each of which ends with a barrier
 };
 
 struct pt_device_ops {
@@ -152,8 +167,9 @@ struct pt_device_ops {
     // NULL: all there are.
     uint32_t (*tail_length)(const struct pt_bound_pass *passes, uint32_t count);
     int (*run_tail)(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count);
-    // All of these at one go: the device is waited for once, and times are its own. cancel, progress: NULL: nobody asks. NULL where
-    // that is no faster than run, run_tail and wait in turn.
+    // All of these at one go: the device is waited for once. cancel, progress: NULL: nobody asks. Times are the device's own: of each
+    // group in a frame that is measured; else only of those over points, and of all others between them. NULL where that is no faster
+    // than run, run_tail and wait in turn.
     int (*run_groups)(struct patina_device *device, struct pt_group *groups, uint32_t count, const atomic_int *cancel,
                       _Atomic float *progress);
     // Waits for all work (so that a clock means something).
@@ -175,6 +191,7 @@ struct patina_device {
     int copies;              // what it is given to borrow, into memory of its own
     uint64_t own_memory;     // bytes that this has for all, as its driver said at the start; 0: not known
     struct pt_ranges ranges; // run/pager.h sets it for a picture
+    int measured;            // the frame whose turn it is wants the time of each pass, and counts of empty dispatches
     // Frames of one device take turns, for its scratch is one. `changed` is told when a turn ends, or a frame is cancelled.
     struct pt_mutex turns;
     struct pt_condition changed;

@@ -643,6 +643,10 @@ class Frame(_Handle):
         values["expected"] = {name: getattr(stats.expected, name) for name, _ in abi.ExpectedError._fields_}
         return values
 
+    def measure(self, each: bool = True) -> None:
+        """From the next render on a GPU times each pass by itself; at first it times most passes together, which takes fewer calls."""
+        self._call("measure", int(each))
+
     def pass_stats(self) -> dict[str, Any]:
         """Milliseconds by pass, and why each other pass was left out."""
         size = library().patina_frame_stats_json(self._handle, None, 0) + 1

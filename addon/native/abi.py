@@ -360,6 +360,7 @@ CALLS = {
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
     "patina_frame_plan_text": (c_void_p, c_void_p, c_char_p, c_size_t),
     "patina_frame_keep_planes": (c_void_p, c_uint32),
+    "patina_frame_measure": (c_void_p, c_uint32),
     "patina_frame_dump_planes": (c_void_p, c_char_p),
     "patina_panorama_camera": (POINTER(Panorama), c_uint32, POINTER(Camera), c_void_p),
     "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),

@@ -102,6 +102,7 @@ class PATINA_PT_statistics_passes(SidebarPanel, Panel):
         found = viewport.of_area(context.area)
         if not found or not found.shown:
             return
+        found.measures = True  # from the next image on
         passes = found.shown.passes
         rows.table(context, self.layout, [(name, f"{ms:.2f} ms") for name, ms in passes["passes"].items()])
         for name, reason in passes["skipped"].items():

@@ -365,6 +365,14 @@ int patina_frame_keep_planes(patina_frame *frame, uint32_t keep)
     return PATINA_OK;
 }
 
+int patina_frame_measure(patina_frame *frame, uint32_t measure)
+{
+    if (!frame)
+        return fail("patina_frame_measure: frame is NULL");
+    frame->measured = measure != 0;
+    return PATINA_OK;
+}
+
 int patina_frame_dump_planes(const patina_frame *frame, const char *folder)
 {
     if (!frame || !folder)

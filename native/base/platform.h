@@ -167,7 +167,4 @@ double pt_decimal(const char *text); // strtod with a decimal point, whatever th
 // First in main(): its arguments as UTF-8, and what it prints as other systems print it. They stay as long as the program runs.
 int pt_program_begin(int *count, char ***arguments);
 
-// Sets a variable of this process's environment. For the command line: no other thread may read the environment meanwhile.
-void pt_set_environment(const char *name, const char *value);
-
 #endif

@@ -569,5 +569,3 @@ int pt_program_begin(int *count, char ***arguments)
     (void)count, (void)arguments;
     return 0;
 }
-
-void pt_set_environment(const char *name, const char *value) { setenv(name, value, 1); }

@@ -674,5 +674,3 @@ int pt_program_begin(int *count, char ***arguments)
     _setmode(_fileno(stderr), _O_BINARY);
     return 0;
 }
-
-void pt_set_environment(const char *name, const char *value) { _putenv_s(name, value); }

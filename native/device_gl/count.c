@@ -3,7 +3,6 @@
 // counter at the thread: a context has a thread of its own.
 #include "device_gl.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_COMMANDS = 4096, COMMAND = 12 }; // indirect dispatches whose sizes are kept; bytes of one
@@ -76,17 +75,26 @@ void pt_gl_count_begin(struct pt_gl_device *d)
 #undef VALUE
 }
 
-int pt_gl_counts_empty(void) { return getenv("PATINA_GL_COUNT_EMPTY") != NULL; }
-
-static void read_commands(struct pt_gl_counter *c)
+uint64_t pt_gl_count_empty(struct pt_gl_device *d, uint32_t first, uint32_t last)
 {
+    const struct pt_gl_counter *c = &d->counter;
     const GladGLContext *gl = &c->driver;
     uint32_t commands[MOST_COMMANDS][COMMAND / 4];
+    uint64_t empty = 0;
+    if (!c->commands || last <= first)
+        return 0;
     gl->BindBuffer(GL_ATOMIC_COUNTER_BUFFER, c->commands);
-    gl->GetBufferSubData(GL_ATOMIC_COUNTER_BUFFER, 0, (GLsizeiptr)COMMAND * c->command_count, commands);
-    gl->DeleteBuffers(1, &c->commands);
-    for (uint32_t i = 0; i < c->command_count; i++)
-        c->counts.empty += !commands[i][0] || !commands[i][1] || !commands[i][2];
+    gl->GetBufferSubData(GL_ATOMIC_COUNTER_BUFFER, (GLintptr)COMMAND * first, (GLsizeiptr)COMMAND * (last - first), commands);
+    for (uint32_t i = 0; i < last - first; i++)
+        empty += !commands[i][0] || !commands[i][1] || !commands[i][2];
+    return empty;
+}
+
+static void read_commands(struct pt_gl_device *d)
+{
+    struct pt_gl_counter *c = &d->counter;
+    c->counts.empty += pt_gl_count_empty(d, 0, c->command_count);
+    c->driver.DeleteBuffers(1, &c->commands);
     c->commands = c->command_count = 0;
 }
 
@@ -101,8 +109,8 @@ static void keep_commands(struct pt_gl_counter *c)
 int pt_gl_counts(struct pt_gl_device *d, void *counts)
 {
     if (d->counter.commands)
-        read_commands(&d->counter);
-    if (pt_gl_counts_empty())
+        read_commands(d);
+    if (d->base.measured)
         keep_commands(&d->counter);
     *(struct pt_counts *)counts = d->counter.counts;
     return pt_gl_check(d, "counting calls");

@@ -345,42 +345,91 @@ static int take_queries(struct pt_gl_device *d, uint32_t count)
 static void read_queries(struct pt_gl_device *d, struct pt_group *groups, uint32_t count)
 {
     GLuint64 before = 0, now = 0;
-    d->gl.GetQueryObjectui64v(d->queries[0], GL_QUERY_RESULT, &before);
-    for (uint32_t i = 0; i < count; i++, before = now) {
-        d->gl.GetQueryObjectui64v(d->queries[i + 1], GL_QUERY_RESULT, &now);
+    uint32_t timer = 0;
+    d->gl.GetQueryObjectui64v(d->queries[timer++], GL_QUERY_RESULT, &before);
+    for (uint32_t i = 0; i < count; i++) {
+        groups[i].ms = 0.0;
+        if (groups[i].joined)
+            continue;
+        d->gl.GetQueryObjectui64v(d->queries[timer++], GL_QUERY_RESULT, &now);
         groups[i].ms = now > before ? (double)(now - before) * 1e-6 : 0.0;
+        before = now;
     }
+}
+
+// Groups that a frame times by themselves: all where it is measured, or else those over points.
+static int is_timed(const struct pt_gl_device *d, const struct pt_group *group)
+{
+    const enum pt_domain domain = pt_kernels[group->passes->kernel].domain;
+    return d->base.measured || domain == PT_DOMAIN_points || domain == PT_DOMAIN_bins;
+}
+
+// Says which groups are timed with those before them. Returns how many are left.
+static uint32_t join_groups(const struct pt_gl_device *d, struct pt_group *groups, uint32_t count)
+{
+    uint32_t left = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        groups[i].joined = i > 0 && d->base.info.hardware && !is_timed(d, &groups[i]) && !is_timed(d, &groups[i - 1]);
+        left += !groups[i].joined;
+    }
+    return left;
+}
+
+// Empty dispatches of each group; begins: its first command, of all and behind them.
+static void count_empty(struct pt_gl_device *d, struct pt_group *groups, uint32_t count, const uint32_t *begins)
+{
+    for (uint32_t i = 0; i < count; i++)
+        groups[i].counts.empty += pt_gl_count_empty(d, begins[i], begins[i + 1]);
+}
+
+// begins: NULL: nobody wants to know.
+static int submit_groups(struct pt_gl_device *d, const struct groups_call *c, int timed, uint32_t *begins)
+{
+    double before = pt_milliseconds();
+    int result = PATINA_OK;
+    for (uint32_t i = 0, timer = 0; i < c->count && result == PATINA_OK; i++) {
+        struct pt_group *group = &c->groups[i];
+        const struct pt_counts counts = d->counter.counts;
+        if (c->cancel && atomic_load(c->cancel))
+            return PATINA_ERROR_CANCELLED;
+        if (timed && !group->joined)
+            d->gl.QueryCounter(d->queries[timer++], GL_TIMESTAMP);
+        if (begins)
+            begins[i] = d->counter.command_count;
+        result = run_group(d, group, c->cancel);
+        if (!timed && d->base.info.hardware && (i + 1 == c->count || !group[1].joined))
+            d->gl.Finish();
+        const double now = pt_milliseconds();
+        group->ms = now - before;
+        before = now;
+        group->counts = pt_counts_between(&counts, &d->counter.counts);
+        if (c->progress)
+            atomic_store(c->progress, group->done);
+        if (timed && i + 1 == c->count)
+            d->gl.QueryCounter(d->queries[timer], GL_TIMESTAMP);
+    }
+    if (begins)
+        begins[c->count] = d->counter.command_count;
+    return result;
 }
 
 static int run_groups(struct pt_gl_device *d, void *context)
 {
     const struct groups_call *c = context;
-    const int timed = take_queries(d, c->count + 1);
-    double before = pt_milliseconds();
-    int result = PATINA_OK;
-    if (timed)
-        d->gl.QueryCounter(d->queries[0], GL_TIMESTAMP);
-    for (uint32_t i = 0; i < c->count && result == PATINA_OK; i++) {
-        if (c->cancel && atomic_load(c->cancel))
-            return PATINA_ERROR_CANCELLED;
-        result = run_group(d, &c->groups[i], c->cancel);
+    const int timed = take_queries(d, join_groups(d, c->groups, c->count) + 1);
+    uint32_t *begins = d->counter.commands ? calloc((size_t)c->count + 1, sizeof *begins) : NULL;
+    int result = submit_groups(d, c, timed, begins);
+    if (result == PATINA_OK) {
         if (timed)
-            d->gl.QueryCounter(d->queries[i + 1], GL_TIMESTAMP);
-        else if (d->base.info.hardware)
+            read_queries(d, c->groups, c->count);
+        else
             d->gl.Finish();
-        const double now = pt_milliseconds();
-        c->groups[i].ms = now - before;
-        before = now;
-        if (c->progress)
-            atomic_store(c->progress, c->groups[i].done);
+        if (begins)
+            count_empty(d, c->groups, c->count, begins);
+        result = pt_gl_check(d, "waiting for the device");
     }
-    if (result != PATINA_OK)
-        return result;
-    if (timed)
-        read_queries(d, c->groups, c->count);
-    else
-        d->gl.Finish();
-    return pt_gl_check(d, "waiting for the device");
+    free(begins);
+    return result;
 }
 
 static int op_run_groups(struct patina_device *device, struct pt_group *groups, uint32_t count, const atomic_int *cancel,
@@ -503,7 +552,7 @@ static int op_counts(struct patina_device *device, struct pt_counts *out)
 {
     struct pt_gl_device *d = (struct pt_gl_device *)device;
     pt_mutex_lock(&d->lock);
-    const int ask = d->keeps_commands || pt_gl_counts_empty();
+    const int ask = d->keeps_commands || device->measured;
     *out = d->counts;
     pt_mutex_unlock(&d->lock);
     return ask ? call(device, pt_gl_counts, out) : PATINA_OK;

@@ -127,11 +127,11 @@ int pt_gl_check(struct pt_gl_device *d, const char *doing);
 // count.c
 // Replaces the functions of d->gl by counting ones. In the GL thread, once the functions are loaded.
 void pt_gl_count_begin(struct pt_gl_device *d);
-// Whether the environment variable PATINA_GL_COUNT_EMPTY asks for empty indirect dispatches.
-int pt_gl_counts_empty(void);
-// counts (out, struct pt_counts): since the device was made. Empty indirect dispatches count between two calls of it, if they were asked
-// for at the first: that takes a small copy for each dispatch, which does not count itself.
+// counts (out, struct pt_counts): since the device was made. Empty indirect dispatches count between two calls of it, if the frame was
+// measured at the first: that takes a small copy for each dispatch, which does not count itself.
 int pt_gl_counts(struct pt_gl_device *d, void *counts);
+// Empty ones among the indirect dispatches from `first` to `last`, numbered since the last pt_gl_counts. Waits; 0 where they are not kept.
+uint64_t pt_gl_count_empty(struct pt_gl_device *d, uint32_t first, uint32_t last);
 
 struct pt_gl_unit {
     GLenum format;

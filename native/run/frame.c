@@ -48,19 +48,14 @@ static int count_since(struct patina_frame *frame, const struct pt_counts *befor
 {
     struct pt_counts now = {0};
     const int error = frame->device->ops->counts(frame->device, &now);
-    frame->counts = (struct pt_counts){.dispatches = now.dispatches - before->dispatches,
-                                       .empty = now.empty - before->empty,
-                                       .barriers = now.barriers - before->barriers,
-                                       .calls = now.calls - before->calls,
-                                       .copies = now.copies - before->copies,
-                                       .waits = now.waits - before->waits,
-                                       .steps = now.steps - before->steps};
+    frame->counts = pt_counts_between(before, &now);
     return error;
 }
 
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene)
 {
     struct pt_counts before = {0};
+    frame->device->measured = frame->measured;
     int counted = frame->device->ops->counts(frame->device, &before);
     double start = pt_milliseconds();
     atomic_store(&frame->progress, 0.0f);

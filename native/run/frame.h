@@ -47,6 +47,7 @@ struct patina_frame {
     struct pt_pager pager;               // of this render
     struct pt_times times;
     struct pt_counts counts; // of this render
+    int measured;            // renders are: see struct patina_device
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     struct pt_layer layers[PATINA_MAX_LAYERS];

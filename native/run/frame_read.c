@@ -210,6 +210,21 @@ int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t number, uin
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
+// What was asked of an OpenGL device, or of the processor, as a JSON object.
+static void write_counts(const struct pt_counts *counts, uint64_t bytes, int gl, char *text, size_t size)
+{
+    if (gl)
+        snprintf(text, size,
+                 "{\"dispatches\":%llu,\"empty\":%llu,\"barriers\":%llu,\"calls\":%llu,\"copies\":%llu,\"waits\":%llu,"
+                 "\"bytes\":%llu}",
+                 (unsigned long long)counts->dispatches, (unsigned long long)counts->empty,
+                 (unsigned long long)counts->barriers, (unsigned long long)counts->calls, (unsigned long long)counts->copies,
+                 (unsigned long long)counts->waits, (unsigned long long)bytes);
+    else
+        snprintf(text, size, "{\"barriers\":%llu,\"bytes\":%llu}", (unsigned long long)counts->steps,
+                 (unsigned long long)bytes);
+}
+
 size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size)
 {
     size_t length = 0;
@@ -242,16 +257,18 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
         (unsigned long long)frame->shown.stats.mapped_bytes, (unsigned long long)frame->shown.stats.mapped_cap,
         (unsigned long long)frame->shown.stats.mapped_held, (unsigned long long)frame->shown.stats.mapped_read,
         frame->shown.stats.mapped_rounds, frame->shown.stats.mapped_returned);
-    const struct pt_counts *counts = &frame->counts;
-    if (counts->calls)
-        PUT(",\"gl\":{\"dispatches\":%llu,\"empty\":%llu,\"barriers\":%llu,\"calls\":%llu,\"copies\":%llu,\"waits\":%llu,"
-            "\"bytes\":%llu}}",
-            (unsigned long long)counts->dispatches, (unsigned long long)counts->empty, (unsigned long long)counts->barriers,
-            (unsigned long long)counts->calls, (unsigned long long)counts->copies, (unsigned long long)counts->waits,
-            (unsigned long long)frame->times.bytes);
-    else
-        PUT(",\"cpu\":{\"barriers\":%llu,\"bytes\":%llu}}", (unsigned long long)counts->steps,
-            (unsigned long long)frame->times.bytes);
+    const int gl = frame->counts.calls > 0;
+    char counts[256];
+    write_counts(&frame->counts, frame->times.bytes, gl, counts, sizeof counts);
+    PUT(",\"%s\":%s,\"work\":{", gl ? "gl" : "cpu", counts);
+    for (uint32_t i = 0, some = 0; i < frame->times.count; i++) {
+        const struct pt_timing *timing = &frame->times.each[i];
+        if (!timing->bytes && !timing->counts.calls && !timing->counts.steps)
+            continue; // a time alone
+        write_counts(&timing->counts, timing->bytes, gl, counts, sizeof counts);
+        PUT("%s\"%s\":%s", some++ ? "," : "", timing->name, counts);
+    }
+    PUT("}}");
 #undef PUT
     return length;
 }

@@ -191,11 +191,13 @@ static int bind_groups(struct pt_execution *e, uint32_t first, uint32_t end, str
 {
     int error = PATINA_OK;
     for (uint32_t i = first, taken; i < end && !error; i += taken) {
+        struct pt_group *group = &groups[(*count)++];
+        const uint64_t bytes = e->times->bytes;
         taken = taken_at(e, i);
-        groups[(*count)++] = (struct pt_group){.passes = bound,
-                                               .count = taken,
-                                               .done = e->progress_done +
-                                                       e->progress_share * (float)(i + taken) / (float)e->plan->pass_count};
+        *group = (struct pt_group){.passes = bound,
+                                   .count = taken,
+                                   .done = e->progress_done +
+                                           e->progress_share * (float)(i + taken) / (float)e->plan->pass_count};
         for (uint32_t k = i; k < i + taken && !error; k++, bound++) {
             const struct pt_pass *pass = &e->plan->passes[k];
             *bound = (struct pt_bound_pass){pass->kernel, NULL, buffers, pass->ref_count, pass->argument_size};
@@ -206,8 +208,17 @@ static int bind_groups(struct pt_execution *e, uint32_t first, uint32_t end, str
             if (!error)
                 note_bytes(e, taken > 1 ? &e->plan->passes[i] : NULL, pass, bound->buffers);
         }
+        group->bytes = e->times->bytes - bytes;
     }
     return error;
+}
+
+// followed: the next group's time is in that of this one.
+static void note_group(struct pt_execution *e, const char *name, const struct pt_group *group, int followed)
+{
+    if (!group->joined)
+        pt_note_time(e->times, followed ? "pixels" : name, group->ms);
+    pt_note_work(e->times, name, group->bytes, &group->counts);
 }
 
 static int hand_over(struct pt_execution *e, uint32_t first, uint32_t end)
@@ -223,7 +234,7 @@ static int hand_over(struct pt_execution *e, uint32_t first, uint32_t end)
     if (!error)
         error = e->device->ops->run_groups(e->device, groups, count, e->writing ? NULL : e->cancel, e->progress);
     for (uint32_t g = 0, i = first; g < count && !error; i += groups[g++].count)
-        pt_note_time(e->times, name_of(e, i, groups[g].count), groups[g].ms);
+        note_group(e, name_of(e, i, groups[g].count), &groups[g], g + 1 < count && groups[g + 1].joined);
     free(bound);
     free(groups);
     free(buffers);
@@ -252,8 +263,10 @@ int pt_run_passes(struct pt_execution *e, uint32_t first, uint32_t count)
     if (e->device->ops->run_groups && !e->merge && !e->binder.planes->poisoned)
         return run_handed_over(e, first, first + count);
     const uint32_t end = first + count;
+    struct pt_counts counts = {0}, asked;
+    uint64_t bytes = e->times->bytes;
     double before = pt_milliseconds();
-    int error = PATINA_OK;
+    int error = e->device->ops->counts(e->device, &counts);
     for (uint32_t i = first; i < end && !error;) {
         const uint32_t taken = taken_at(e, i);
         const char *name = name_of(e, i, taken);
@@ -267,6 +280,13 @@ int pt_run_passes(struct pt_execution *e, uint32_t first, uint32_t count)
         const double now = pt_milliseconds();
         pt_note_time(e->times, name, now - before);
         before = now;
+        error = error ? error : e->device->ops->counts(e->device, &asked);
+        if (error)
+            break;
+        counts = pt_counts_between(&counts, &asked);
+        pt_note_work(e->times, name, e->times->bytes - bytes, &counts);
+        counts = asked;
+        bytes = e->times->bytes;
         if (e->progress)
             atomic_store(e->progress, e->progress_done + e->progress_share * (float)i / (float)e->plan->pass_count);
     }

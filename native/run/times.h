@@ -5,11 +5,13 @@
 
 #include "device.h"
 
-enum { PT_TIMINGS = PT_KERNEL_COUNT + 4 };
+enum { PT_TIMINGS = PT_KERNEL_COUNT + 5 };
 
 struct pt_timing {
     const char *name;
     double ms;
+    uint64_t bytes;          // that its passes read and write, by the plan
+    struct pt_counts counts; // what they asked of the device
 };
 
 struct pt_times {
@@ -19,5 +21,6 @@ struct pt_times {
 };
 
 void pt_note_time(struct pt_times *times, const char *name, double ms);
+void pt_note_work(struct pt_times *times, const char *name, uint64_t bytes, const struct pt_counts *counts);
 
 #endif

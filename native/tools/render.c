@@ -332,11 +332,9 @@ static int write_picture(const struct job *job)
 static int measure(struct job *job)
 {
     struct tool_times *times = tool_times_create(job->options.repeat);
-    int code = times ? PATINA_OK : PATINA_ERROR_MEMORY;
+    int code = times ? patina_frame_measure(job->frame, job->options.json != 0) : PATINA_ERROR_MEMORY;
     for (int i = 1; i <= job->options.repeat && !code; i++) {
         patina_camera camera = {.struct_size = sizeof camera};
-        if (i == job->options.repeat && job->options.json) // the statistics of the last frame tell empty dispatches
-            pt_set_environment("PATINA_GL_COUNT_EMPTY", "1");
         code = tool_cancelled() ? PATINA_ERROR_CANCELLED : set_view(job, i, &camera);
         const double start = pt_milliseconds();
         if (!code)

@@ -19,6 +19,7 @@ struct tool_times {
     double *pass_ms[MAX_PASSES]; // a frame; 0 where the pass did not run
     char *skipped, *planes;      // of the last frame, as JSON
     char *gl, *cpu;              // what the last frame asked of the device; NULL: of the other kind
+    char *work;                  // the same by pass
 };
 
 struct tool_times *tool_times_create(int frames)
@@ -44,6 +45,7 @@ void tool_times_destroy(struct tool_times *times)
     free(times->planes);
     free(times->gl);
     free(times->cpu);
+    free(times->work);
     free(times->ms);
     free(times);
 }
@@ -133,6 +135,7 @@ int tool_times_add(struct tool_times *times, double ms, const patina_frame *fram
     keep_object(json, "\"planes\":", &times->planes);
     keep_object(json, "\"gl\":", &times->gl);
     keep_object(json, "\"cpu\":", &times->cpu);
+    keep_object(json, "\"work\":", &times->work);
     free(json);
     times->ms[times->frames++] = ms;
     return 0;
@@ -193,6 +196,8 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
         printf(", \"gl\": %s", times->gl);
     if (times->cpu)
         printf(", \"cpu\": %s", times->cpu);
+    if (times->work)
+        printf(", \"work\": %s", times->work);
     printf(", \"mapped\": {\"bytes\": %llu, \"cap\": %llu, \"held\": %llu, \"read\": %llu, \"rounds\": %u, \"returned\": %u}",
            (unsigned long long)stats->mapped_bytes, (unsigned long long)stats->mapped_cap,
            (unsigned long long)stats->mapped_held, (unsigned long long)stats->mapped_read, stats->mapped_rounds,

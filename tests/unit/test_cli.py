@@ -671,6 +671,24 @@ def test_stats_of_opengl():
     assert counts["waits"] >= 1 and counts["bytes"] > 20000 * 12, counts
 
 
+def test_stats_of_passes():
+    """What each pass asks for, which is no more than all of them do; a GPU has a time for each as well."""
+    ball("asked.ply")
+    for device, kind in (("cpu", "cpu"), ("gl-egl", "gl")):
+        done = subprocess.run([*PATINA, "render", "asked.ply", "--stats", "json", "--repeat", "2", "--size", "64x48", "--device", device],
+                              capture_output=True, text=True, cwd=FOLDER, timeout=300, check=False, env={**os.environ, "PATINA_GL_AS": "hardware"})
+        if done.returncode and kind == "gl":
+            print("skip stats_of_passes: there is no OpenGL device here")
+            return
+        stats = json.loads(done.stdout)
+        assert {"scatter", "resolve", "fill", "tail"} <= stats["work"].keys() & stats["passes"].keys(), (device, stats["work"])
+        assert "pixels" not in stats["passes"], stats["passes"]  # it is measured
+        for name, total in stats[kind].items():
+            asked = sum(one[name] for one in stats["work"].values())
+            assert asked == total if name == "bytes" else asked <= total, (device, name, asked, total)
+        assert all(one["bytes"] > 0 for one in stats["work"].values()), stats["work"]
+
+
 def test_stats():
     ball("stats.ply")
     done = run("render", "stats.ply", "--stats", "json", "--repeat", "5", "--size", "320x200", "--device", "cpu")

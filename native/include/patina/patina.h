@@ -766,16 +766,19 @@ PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_st
 // 80 bytes each: peak counts them.
 // "samples":{"grid":..,"shifts":..}: how pixel_samples were taken, pixels on each side of one, times shifted.
 // "gl":{"dispatches":..,"empty":..,"barriers":..,"calls":..,"copies":..,"waits":..,"bytes":..} of an OpenGL device, "cpu":{"barriers":..,
-// "bytes":..} of the processor: what the render asked of it. empty: dispatches without a workgroup; indirect ones count if the environment
-// variable PATINA_GL_COUNT_EMPTY was set before the render. copies: between buffers, and into parts of buffers. waits: calls that block
-// until submitted work is done. barriers of the processor: steps of several threads, each of which ends when all are done. bytes: what the
-// passes read and write by the plan, each of their buffers whole.
+// "bytes":..} of the processor: what the render asked of it. empty: dispatches without a workgroup; indirect ones count in frames that are
+// measured. copies: between buffers, and into parts of buffers. waits: calls that block until submitted work is done. barriers of the
+// processor: steps of several threads, each of which ends when all are done. bytes: what the passes read and write by the plan, each of
+// their buffers whole. "work":{"PASS":{..},..}: the same fields for each pass.
 // Returns the full length; truncates to size.
 PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
 // The plan as text, a line a pass, without rendering. Returns the full length.
 PATINA_API size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, char *buffer, size_t size);
 // 1: from the next render on no planes share memory, so that patina_frame_dump_planes has them all; takes more of it. 0: as at first.
 PATINA_API int patina_frame_keep_planes(patina_frame *frame, uint32_t keep);
+// 1: from the next render on a GPU times each pass by itself, and empty indirect dispatches are counted. That costs a few calls for each
+// pass. 0, as at first: a GPU times the passes over points, and all others between them together, by the name "pixels".
+PATINA_API int patina_frame_measure(patina_frame *frame, uint32_t measure);
 // Writes every plane of the last render, but bins of discs and those that others took the place of, as raw little-endian files with a .txt line of their shape into a folder.
 PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *folder);
 
