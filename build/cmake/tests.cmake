@@ -80,6 +80,12 @@ set_target_properties(bench_town PROPERTIES OUTPUT_NAME town RUNTIME_OUTPUT_DIRE
 target_link_libraries(bench_town PRIVATE patina_test_support patina_test)
 add_dependencies(all_tests bench_town)
 
+# How fast a device writes.
+add_executable(bench_bandwidth EXCLUDE_FROM_ALL ${TESTS}/bench/bandwidth.c)
+set_target_properties(bench_bandwidth PROPERTIES OUTPUT_NAME bandwidth RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests/bench)
+target_link_libraries(bench_bandwidth PRIVATE patina_test)
+add_dependencies(all_tests bench_bandwidth)
+
 # tests/fuzz/fuzz_NAME.c: libFuzzer targets; without PATINA_FUZZ they only replay a corpus.
 file(GLOB sources CONFIGURE_DEPENDS ${TESTS}/fuzz/fuzz_*.c)
 if(CMAKE_C_COMPILER_ID MATCHES "Clang" AND PATINA_SANITIZE)

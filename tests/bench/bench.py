@@ -22,19 +22,18 @@ on the disk), walk (frame by frame
 through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs), soft (soft points in the sizes
 of [S Table 1], its models and orders, and against OSPRay), platforms (Blender's start with the add-on, sizes of packages, instructions of NEON's inner
 loops). With --quick they take a million points, and one
-minute. Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor)
-and scaling (threads up to all cores).
+minute. Two are of --only alone, for they need what most machines lack: gpu (frames of OpenGL, pass by pass, beside the processor) and
+scaling (threads up to all cores).
 """
 
 from __future__ import annotations
 
 import argparse
-import datetime
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +41,7 @@ import analysis
 import case as cases
 import cues
 import files
+import gpu
 import imports
 import instructions
 import machine
@@ -55,12 +55,14 @@ import quoted
 import ranges
 import readme
 import report
+import rows as kept
 import scans
 import soft
 import soft_models
 import soft_points
 import stage
 import start
+import tables
 import volumes
 import walk
 import window
@@ -71,7 +73,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "scans", "independent", "session", "analysis", "files", "walk", "ranges", "soft", "platforms", "graphics", "scaling")
+          "leaves", "scans", "independent", "session", "analysis", "files", "walk", "ranges", "soft", "platforms", "gpu", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -141,9 +143,6 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
     found += papers.cases(main, quick)
     if full or options.readme or "independent" in options.only:
         found += independent(main, quick)
-    for group, make in (("graphics", on_graphics), ("scaling", over_threads)):
-        if group in options.only:
-            found += make(quick)
     return [one for one in found if not options.only or one["group"] in options.only]
 
 
@@ -165,24 +164,21 @@ def independent(device: str, quick: bool) -> list[dict[str, Any]]:
     return cases
 
 
-def on_graphics(quick: bool) -> list[dict[str, Any]]:
-    """The torus on a graphics processor, and on the processor with all its threads. Held against the truth where there is one
-    that takes no minutes."""
-    large = [] if quick else [{"points": 10_000_000}, {"points": 100_000_000}, {"size": 4096, "unheld": 1}]
-    asked = [{}, {"quality": "paper"}, {"quality": "unfilled"}, {"quality": "splats"}, *large,
-             *({"mode": mode} for mode in ("shadows kept", "shadows 1")),
-             *({"mode": mode, "unheld": 1} for mode in ("shadows 10", "6 layers", "lines 2", "eye-dome lighting",
-                                                        "ambient obscurance", "depth of field"))]
-    return [case_of("graphics", device=device, **{"points": 1_000_000, **one}, graphics=int(device == "gl-egl"))
-            for one in asked for device in ("gl-egl", "cpu")]
-
-
-def over_threads(quick: bool) -> list[dict[str, Any]]:
-    """The processor with 1, 2, 4, ... and all threads."""
-    cores = machine.cores()
-    asked = [{}] if quick else [{}, {"points": 10_000_000}, {"size": 4096, "unheld": 1}]
-    return [case_of("scaling", threads=threads, **{"points": 1_000_000, **one})
-            for one in asked for threads in sorted({*(2**k for k in range(8) if 2**k <= cores), cores})]
+def frame_rows(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """Rows of gpu.py, each number of points in a process of its own."""
+    sizes = list(gpu.SIZES)[: 1 if options.quick else None]
+    device = next((name for name in options.device if name != "cpu"), "gl-egl")
+    asked: list[list[str]] = []
+    if "gpu" in options.only:
+        asked += [[str(points), "--device", device, *(word for what in whats for word in ("--what", what))]
+                  for points, whats in ((1_000_000, gpu.WHATS), (10_000_000, ("surface",)), (100_000_000, ("surface",)))[: 1 if options.quick else None]]
+    if "scaling" in options.only:
+        asked += [[str(points), "--threads"] for points in (1_000_000, 10_000_000)[: 1 if options.quick else None]]
+    for words in asked:
+        case = {"group": "gpu", "scene": "torus", "mode": "surface", "device": device, "points": int(words[0]), "quality": "refined"}
+        reason = too_large(case)
+        yield from [{**case, "unavailable": reason}] if reason else gpu.separately(
+            [*words, "--frames", str(options.frames), *(word for size in sizes for word in ("--size", size))])
 
 
 def too_large(case: dict[str, Any]) -> str:
@@ -192,16 +188,6 @@ def too_large(case: dict[str, Any]) -> str:
     need = case["points"] * 90 / 2**20  # our cloud while it is built, beside the arrays
     free = machine.memory_free()
     return f"needs about {need:.0f} MB, {free:.0f} are free" if need > free else ""
-
-
-def split(result: dict[str, Any], row: dict[str, Any]) -> None:
-    """Puts a measured case where it belongs."""
-    if "unavailable" in row:
-        result["absent"].append({key: row.get(key) for key in ("group", "scene", "mode", "device", "points", "quality",
-                                                               "unavailable")})
-        return
-    result["rows"].append({name: row[name] for name in cases.FIELDS})
-    result["details"].append({key: value for key, value in row.items() if key not in cases.FIELDS})
 
 
 def hard_cases(options: argparse.Namespace) -> str:
@@ -248,25 +234,23 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
 def measure(options: argparse.Namespace) -> dict[str, Any]:
     os.environ["PATINA_LIBRARY"] = str(options.library)
     stage.tidy()
-    result = {
-        "date": datetime.date.today().isoformat(), "processor": machine.processor(), "cores": machine.cores(),
-        "load": os.getloadavg()[0], "version": cases.native.library().patina_version().decode(),
-        "frames": options.frames,
-        "distance": stage.DISTANCE, "elevation": stage.ELEVATION, "fov": stage.FOV,
-        "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1),
-        "rows": [], "details": [], "absent": [], "parts": {},
-    }
+    result = kept.begin(cases.native.library().patina_version().decode(), frames=options.frames)
+
+    def keep(row: dict[str, Any]) -> None:
+        say(row)
+        kept.add(result, row)
+        kept.write(result, options.out)
+
     for case in chosen(options):
         reason = too_large(case)
-        row = {**case, "unavailable": reason} if reason else cases.run(case, str(options.library))
-        if "unavailable" not in row:
-            row["floor_ms"] = (12 * row["points"] + row["plane_bytes"]) / result["bandwidth"] / 1e6
-        say(row)
-        split(result, row)
+        keep({**case, "unavailable": reason} if reason else cases.run(case, str(options.library)))
+    if "gpu" in options.only:
+        result["gpu_bandwidth"] = gpu.bandwidth("gl-egl", options.library.parent)
+    for row in frame_rows(options):
+        keep(row)
     for group, others in (("styles", peers.measure_styles), ("peers", peers.measure)):
         for row in others(options.quick, options.library) if not options.only or group in options.only else ():
-            say(row)
-            split(result, row)
+            keep(row)
     if not options.only or "shadows" in options.only:
         result["soft"] = soft.measure(options.device[0])
     if "scans" in options.only or ((options.full or options.readme) and not options.only):
@@ -282,11 +266,12 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
                 text = f"skip: {error}"
             print(f"{group}: {name}: {text.splitlines()[-1]}", file=sys.stderr)
             result["parts"][name] = {"title": title, "text": text}
+            kept.write(result, options.out)
     return result
 
 
 def say(row: dict[str, Any]) -> None:
-    name = f"{row['group']}: {row['scene']}, {row['mode']}, {report.name_of(row)}, {row['width']}, " \
+    name = f"{row['group']}: {row['scene']}, {row['mode']}, {tables.name_of(row)}, {row['width']}, " \
            f"{row['points']:,} points, {row['quality']}"
     if "unavailable" in row:
         print(f"skip {name}: {row['unavailable']}", file=sys.stderr)
@@ -322,7 +307,7 @@ def main() -> int:
         text += "\n" + report.compare(result, old)
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "bench.md").write_text(text)
-    (options.out / "bench.json").write_text(json.dumps(result, indent=1))
+    kept.write(result, options.out)
     drawn = plots.draw(result, options.out)
     (options.out / "bench.html").write_text(page.html(text, drawn))
     print(text)

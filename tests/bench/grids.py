@@ -20,7 +20,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "addon"), str(Path(__file__).resolve().parent)]
 
-from report import table  # noqa: E402
+from tables import table  # noqa: E402
 
 NEAR = 1.5e-3  # of the models' unit, metres
 SURFACES = {"automatic": 0, "discs": 1, "filling": 2, "range images": 3}

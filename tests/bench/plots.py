@@ -11,7 +11,8 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
-from report import count, joined, name_of, pass_names  # noqa: E402
+from report import pass_names  # noqa: E402
+from tables import count, joined, name_of  # noqa: E402
 
 Row = dict[str, Any]
 

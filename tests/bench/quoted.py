@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from report import table
+from tables import table
 
 ROOT = Path(__file__).resolve().parents[2]
 SUN_HEIGHTS = ("2", "5", "10", "20", "45", "90")

@@ -20,7 +20,7 @@ import metrics  # noqa: E402
 import numpy as np  # noqa: E402
 import stage as stages  # noqa: E402
 from native.points import ScanSet  # noqa: E402
-from report import table  # noqa: E402
+from tables import table  # noqa: E402
 from truth import look, orbit, scenes  # noqa: E402
 from truth.camera import parallel  # noqa: E402
 from truth.scene import srgb_bytes  # noqa: E402

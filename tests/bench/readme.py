@@ -7,9 +7,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import gpu
 import papers
 import plots
-from report import Row, count, joined, name_of, table
+from tables import Row, count, joined, name_of, table
 
 PAGES = ("README.md", "tests/bench/README.md")
 NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2", "cpu-neon": "processor, NEON",
@@ -83,29 +84,6 @@ def effects(result: dict[str, Any]) -> str:
                          f"{row['ms_median']:.1f}", other["device"], f"{other['ms_median']:.0f}",
                          f"{other['ms_median'] / row['ms_median']:.1f}×"])
     return table(["what", "quality", "ms", "peer", "ms", "ratio"], body)
-
-
-WHAT = {"surface": "opaque", "6 layers": "six layers, half transparent", "shadows kept": "hard shadows, only the camera moves",
-        "shadows 1": "hard shadows, the sun moves too", "shadows 10": "soft shadows of 10 samples, the sun moves too",
-        "lines 2": "lines 2 pixels wide"}
-
-
-def graphics(result: dict[str, Any]) -> str:
-    """A graphics processor beside the processor: the same pictures, so one error stands for both."""
-    rows = joined(result, "graphics")
-    key = ("points", "width", "mode", "quality")
-    beside = {tuple(row[k] for k in key): row["ms_median"] for row in rows if row["device"] == "cpu"}
-    body, drawn = [], [row for row in rows if row["device"] != "cpu"]
-    for row in drawn:
-        e, ms, other = row["error"], row["ms_median"], beside.get(tuple(row[k] for k in key))
-        depth = f"{e['depth_rms_spacings']:.2f}" if "depth_rms_spacings" in e else "–"
-        body.append([count(row["points"]), f"{row['width']}²", WHAT.get(row["mode"], row["mode"]),
-                     QUALITIES.get(row["quality"], row["quality"]), f"{ms:.2f}",
-                     f"{other:.1f} ({other / ms:.1f}×)" if other else "–", depth,
-                     f"{e['color_psnr']:.1f}" if "color_psnr" in e else "–"])
-    head = ["points", "picture", "what", "quality", "ms", "processor, ms", "depth rms, spacings", "PSNR, dB"]
-    return (f"{result['date']}, {drawn[0]['device_description']}, beside {result['processor']}, {result['cores']} cores.\n\n" +
-            table(head, body))
 
 
 def scaling(result: dict[str, Any]) -> str:
@@ -241,8 +219,8 @@ def update(result: dict[str, Any], root: Path) -> str:
         when = f"{title}; {result['load']:.0f} programs ran beside it.\n\n"
         parts |= {"ranges paper": when + ranges.paper(result["ranges"]), "ranges surfaces": when + ranges.surfaces(result["ranges"])}
         plots.ranges(result["ranges"], root / ".pictures/ranges.png", title)
-    if any(row["device"] != "cpu" for row in joined(result, "graphics")):
-        parts["graphics"] = graphics(result)
+    if any(row.get("hardware") for row in joined(result, "gpu")):
+        parts["gpu"] = f"{result['date']}, beside {result['processor']}, {result['cores']} cores.\n\n" + gpu.markdown(result, few=True)
     if any(row["threads"] > 1 for row in joined(result, "scaling")):
         parts["scaling"] = scaling(result)
     for quality in ("paper", "refined"):

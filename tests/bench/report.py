@@ -5,35 +5,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import gpu
 import papers
 import soft
 from metrics import MEANING
+from tables import Row, count, joined, name_of, table
 
-Row = dict[str, Any]
 KEY = ("scene", "mode", "device", "width", "height", "points", "quality", "threads")
 PERCENT = ("false_holes", "inner_holes", "false_growth", "outer_growth")
-
-
-def table(head: list[str], rows: list[list[str]]) -> str:
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
-
-
-def count(points: int) -> str:
-    if points >= 1_000_000:
-        return f"{points / 1e6:.3g}M"
-    return f"{points / 1e3:.3g}k" if points >= 1000 else str(points)
-
-
-def name_of(row: Row) -> str:
-    threads = f", {row['threads']} threads" if row["threads"] > 1 else ", 1 thread" if row["threads"] else ""
-    return f"{row.get('device_name', row['device'])}{threads}"
-
-
-def joined(result: dict[str, Any], *groups: str) -> list[Row]:
-    """Rows with their details, of some groups or all."""
-    rows = [{**detail, **row} for row, detail in zip(result["rows"], result["details"])]
-    return [row for row in rows if not groups or row["group"] in groups]
 
 
 def pass_names(rows: list[Row]) -> list[str]:
@@ -108,11 +87,14 @@ def markdown(result: dict[str, Any]) -> str:
                          ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
                          ("shadows", "A ball's shadow on a plane"), ("patterns", "Patterns and noise"),
                          ("steady", "Steadiness under a slow turn"),
-                         ("independent", "Shapes that no rule was made on"),
-                         ("graphics", "On a graphics processor, and on the processor"), ("scaling", "Over threads")):
+                         ("independent", "Shapes that no rule was made on")):
         rows = joined(result, group)
         if rows:
             text += [f"## {title}", "", errors_table(rows), ""]
+    if joined(result, "gpu"):
+        text += ["## Frames of OpenGL, pass by pass", "", gpu.markdown(result), ""]
+    if joined(result, "scaling"):
+        text += ["## Over threads", "", times_table(joined(result, "scaling")), ""]
     if result.get("ranges"):
         import ranges  # which imports this
         text += [ranges.markdown(result["ranges"]), ""]

@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(ROOT / "tests"), str(HERE)]
 
-from report import table  # noqa: E402
+from tables import table  # noqa: E402
 from truth.scans import metrics, run  # noqa: E402
 from truth.scans.exact import Stage, camera  # noqa: E402
 from truth.scans.scenes import FOV, HEIGHT, SKY, STEP, WIDTH, Scene  # noqa: E402

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import subprocess
@@ -17,9 +18,13 @@ sys.path.insert(0, str(HERE))
 
 import bench  # noqa: E402
 import case as cases  # noqa: E402
+import gpu  # noqa: E402
 import plots  # noqa: E402
 import quoted  # noqa: E402
 import readme  # noqa: E402
+import rows as kept  # noqa: E402
+
+import native  # noqa: E402
 
 FIELDS = ["scene", "mode", "device", "width", "height", "points", "quality", "threads", "ms_median", "ms_min", "ms_max",
           "peak_mb", "passes", "error"]
@@ -104,23 +109,52 @@ class Bench(unittest.TestCase):
         readme.update({**self.result, "parts": {"leaves": {"title": "", "text": empty}, "slopes": {"title": "", "text": full}}}, self.out)
         self.assertEqual(path.read_text(), f"<!-- bench leaves -->\nold\n<!-- end -->\n<!-- bench slopes -->\n{full}\n<!-- end -->\n")
 
-    def test_graphics_refuses_software(self) -> None:
-        """Figures of a graphics processor come from one, or are not there."""
-        case = bench.case_of("graphics", device="gl-egl", points=10_000, size=64, frames=1, graphics=1)
-        library = str(HERE.parents[1] / "build/out/release/libpatina.so")
-        for driver, wanted in (("software", False), ("hardware", True)):
-            with mock.patch.dict(os.environ, PATINA_GL_AS=driver, PATINA_LIBRARY=library):
-                try:
-                    row = cases.measure(case)
-                except cases.native.PatinaError as error:
-                    row = {**case, "unavailable": str(error)}
-            self.assertEqual("unavailable" not in row, wanted, row.get("unavailable"))
-            result = {**self.result, "rows": [], "details": [], "absent": []}
-            bench.split(result, row)
+    def test_rows_are_kept_as_they_come(self) -> None:
+        """A run that is interrupted keeps what it has."""
+        out = self.out / "interrupted"
+        row = {**self.result["rows"][0], **self.result["details"][0]}
+        options = argparse.Namespace(quick=True, full=False, readme=False, only=["headline"], frames=1, device=["cpu"], out=out,
+                                     library=HERE.parents[1] / "build/out/release/libpatina.so")
+        with mock.patch.object(cases, "run", side_effect=[row, KeyboardInterrupt]), self.assertRaises(KeyboardInterrupt):
+            bench.measure(options)
+        result = json.loads((out / "bench.json").read_text())
+        self.assertEqual([one["ms_median"] for one in result["rows"]], [row["ms_median"]])
+        self.bench("--from", str(out / "bench.json"))
+
+    def test_frames_of_opengl(self) -> None:
+        """Rows of gpu.py: what passes ask for adds up, both devices show the same, a GPU's times are those of its passes."""
+        for driver in ("software", "hardware"):
+            with mock.patch.dict(os.environ, PATINA_GL_AS=driver, PATINA_LIBRARY=str(HERE.parents[1] / "build/out/release/libpatina.so")):
+                found = list(gpu.separately(["20000", "--size", "160x120", "--size", "64x64", "--frames", "3", "--what", "surface", "--what", "6 layers"]))
+            if "unavailable" in found[0]:
+                self.skipTest(f"there is no OpenGL device here: {found[0]['unavailable']}")
+            self.assertEqual([(row["device"], row["what"], row["width"]) for row in found],
+                             [(device, what, width) for what, width in (("surface", 160), ("surface", 64), ("6 layers", 160))
+                              for device in ("gl-egl", "cpu")])
+            result = {**self.result, "rows": [], "details": [], "absent": [], "gpu_bandwidth": 2.0}
+            for row in found:
+                kept.add(result, row)
+            for row in (row for row in found if row["device"] == "gl-egl"):
+                self.assertTrue(row["same"], row)
+                self.assertEqual(row["hardware"], driver == "hardware")
+                self.assertLessEqual({"scatter", "resolve", "fill"}, set(row["passes"]) & set(row["work"]))
+                for name in (*gpu.COUNTS, "bytes"):
+                    asked = sum(one[name] for one in row["work"].values())
+                    self.assertLessEqual(asked, row["gl"][name], name)
+                    self.assertGreater(asked, row["gl"][name] // 2 if name not in ("empty", "waits") else -1, name)
             path = self.out / "README.md"
-            path.write_text("<!-- bench graphics -->\nold\n<!-- end -->\n")
+            path.write_text("<!-- bench gpu -->\nold\n<!-- end -->\n")
             readme.update(result, self.out)
-            self.assertEqual("old" not in path.read_text(), wanted)
+            self.assertEqual("old" not in path.read_text(), driver == "hardware")  # figures of a GPU come from one
+            self.assertIn("| 20k, 160 x 120, surface |", gpu.markdown(result))
+
+    def test_devices_that_differ_are_found(self) -> None:
+        subject = gpu.Subject(20_000)
+        frames = [native.Frame(native.Device("cpu")) for _ in range(2)]
+        for frame, turn in zip(frames, (0.0, 3.0)):
+            frame.render(subject.scene("surface", (64, 64), turn))
+        self.assertTrue(gpu.agreement(frames[0], frames[0])["same"])
+        self.assertFalse(gpu.agreement(*frames)["same"])
 
     def test_independent(self) -> None:
         """A line a shape and quality, the worst of each column but decibels."""
@@ -135,19 +169,10 @@ class Bench(unittest.TestCase):
         self.assertEqual(len(table), 3)
         self.assertTrue(table[2].startswith("| knot | analysed | 30.0 | 35.0 | 4.0 | 0.40 | 0.00 | 4.00 | -0.200 | 2.0 / 2.0 |"), table[2])
 
-    def test_graphics_and_scaling(self) -> None:
+    def test_scaling(self) -> None:
         row, detail = self.result["rows"][0], self.result["details"][0]
-        rows = [{**row, "device": device, "mode": mode, "threads": threads, "ms_median": ms}
-                for device, mode, threads, ms in (("gl-egl", "surface", 0, 2.0), ("cpu", "surface", 0, 5.0),
-                                                  ("gl-egl", "6 layers", 0, 4.0), ("cpu", "surface", 1, 12.0),
-                                                  ("cpu", "surface", 2, 8.0))]
-        groups = ["graphics"] * 3 + ["scaling"] * 2
-        result = {**self.result, "rows": rows, "details": [{**detail, "group": group, "device_description": "Some GPU"}
-                                                           for group in groups]}
-        table = readme.graphics(result).splitlines()
-        self.assertIn("Some GPU", table[0])
-        self.assertIn("| 2.00 | 5.0 (2.5×) |", table[4])
-        self.assertIn("| six layers, half transparent | refined | 4.00 | – |", table[5])
+        rows = [{**row, "device": "cpu", "threads": threads, "ms_median": ms} for threads, ms in ((1, 12.0), (2, 8.0))]
+        result = {**self.result, "rows": rows, "details": [{**detail, "group": "scaling"}] * 2}
         self.assertTrue(readme.scaling(result).endswith("| 12.0 (1.0×) | 8.0 (1.5×) |"))
 
     def test_quoted(self) -> None:

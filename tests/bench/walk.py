@@ -29,8 +29,8 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(ROOT / "tests"), str(HERE), str(ROOT / "addon")]
 
 import stage  # noqa: E402
-from report import count, table  # noqa: E402
 from scans import FAR, NEAR, peer_command  # noqa: E402
+from tables import count, table  # noqa: E402
 from truth.camera import Camera, orbit  # noqa: E402
 from truth.scans.exact import Stage, camera  # noqa: E402
 from truth.scans.run import scenes_of  # noqa: E402
