@@ -191,13 +191,14 @@ static int open_context(struct pt_gl_device *d, void *unused)
     info->hardware = as ? !strcmp(as, "hardware") : !is_software(info->description);
 
     GLint64 block = 0;
-    GLint blocks = 0, bindings = 0, alignment = 0, texel_alignment = 0, texels = 0;
+    GLint blocks = 0, bindings = 0, alignment = 0, texel_alignment = 0, texels = 0, shared = 0;
     d->gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &block);
     d->gl.GetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
     d->gl.GetIntegerv(GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS, &bindings);
     d->gl.GetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
     d->gl.GetIntegerv(GL_TEXTURE_BUFFER_OFFSET_ALIGNMENT, &texel_alignment);
     d->gl.GetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
+    d->gl.GetIntegerv(GL_MAX_COMPUTE_SHARED_MEMORY_SIZE, &shared);
     int result = pt_gl_check(d, "reading the driver's limits");
     if (result != PATINA_OK)
         return result;
@@ -210,6 +211,7 @@ static int open_context(struct pt_gl_device *d, void *unused)
     alignment = alignment > texel_alignment ? alignment : texel_alignment; // powers of two
     d->alignment = alignment > 4 ? (size_t)alignment : 4;
     d->texels = texels > 0 ? (size_t)texels : 0;
+    d->shared_size = shared > 0 ? (size_t)shared : 0;
     d->gl.GenBuffers(1, &d->arguments);
     d->gl.GenTextures(PT_UNIT_COUNT, d->textures);
     make_srgb_table(d);

@@ -90,6 +90,7 @@ struct pt_gl_device {
     size_t largest;    // buffer that there is memory for, as tests have it
     size_t alignment;  // of a block's or a texture's offset in its buffer
     size_t texels;     // in a buffer texture
+    size_t shared_size; // bytes that the invocations of a workgroup share
     GLuint arguments;
     GLuint srgb;    // uniform block: linear values of the 256 sRGB bytes
     uint32_t stamp; // fill: of the current step
@@ -230,7 +231,7 @@ typedef int pt_gl_runner(struct pt_gl_device *d, const struct pt_gl_work *work);
 int pt_gl_is_pointwise(enum pt_kernel kernel); // pointwise.c runs it
 pt_gl_runner pt_gl_pointwise;
 pt_gl_runner pt_gl_raster, pt_gl_scatter, pt_gl_splat, pt_gl_blend, pt_gl_average, pt_gl_merge, pt_gl_differ, pt_gl_points,
-    pt_gl_fill, pt_gl_shade, pt_gl_antialias, pt_gl_push, pt_gl_lines, pt_gl_gather, pt_gl_soft;
+    pt_gl_fill, pt_gl_fill_tiles, pt_gl_shade, pt_gl_antialias, pt_gl_push, pt_gl_lines, pt_gl_gather, pt_gl_soft;
 int pt_gl_points_of(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t variant);
 // The picture from what is shaded: smooth, antialias and compose at once, whose passes these are.
 int pt_gl_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// fill's runner: find, decide and apply, then mark and restore, as often as the plan allows. How long its lists are stays in a buffer, and
-// a dispatch takes its workgroups from there: steps behind the last that changed something walk nothing, and nobody waits for a count.
+// fill's runner in software: find, decide and apply, then mark and restore, as often as the plan allows. How long its lists are stays in a
+// buffer, and a dispatch takes its workgroups from there. On a GPU fill_tiles.c does it.
 #include "device_gl.h"
 #include "shared/filling.h"
 
@@ -10,9 +10,9 @@ enum {
 
 enum program { FIND_EMPTY, FIND_OCCLUDED, FIND_COARSE, DECIDE, APPLY, WAKE, MARK, RESTORE, SELECT, COUNT };
 
-// Heads of lists in fill.comp's walks: who walks what; behind them how many workgroups of a step have finished.
+// Heads of lists in fill.comp's walks: who walks what.
 enum { CHANGES, APPLIES, SAVES, TILES, LOOKS, WALKS };
-enum { WALKS_SIZE = (WALKS + 1) * PT_GL_LIST_HEAD };
+enum { WALKS_SIZE = WALKS * PT_GL_LIST_HEAD };
 
 // Steps of fill.comp that list something.
 enum listing { FOUND = 0, WOKEN = 3, MARKED = 4, SELECTED = 6 };
@@ -46,7 +46,7 @@ static int programs(struct fill *f)
                                               "#define STEP 7\n"};
     int result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, f->find, definitions[f->find]);
     for (uint32_t p = DECIDE; p <= COUNT && result == PATINA_OK; p++)
-        if (p == COUNT ? !f->d->base.info.hardware : f->args->unfills || p <= WAKE)
+        if (p == COUNT || f->args->unfills || p <= WAKE)
             result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, p, definitions[p]);
     return result;
 }
@@ -54,9 +54,8 @@ static int programs(struct fill *f)
 // How many tiles there are: for who says how many workgroups look at all of them, and for those.
 static void tell_tiles(struct fill *f)
 {
-    const enum program counts = f->d->base.info.hardware ? f->find : COUNT;
     const GLuint tiles = f->d->tiles.columns * f->d->tiles.rows;
-    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][counts], 3, tiles);
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][COUNT], 3, tiles);
     f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][WAKE], 3, tiles);
 }
 
@@ -104,11 +103,8 @@ static int walk(struct fill *f, enum program p, uint32_t head)
     return pt_gl_list_dispatch(f->d, PT_KERNEL_fill, p, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name, head * PT_GL_LIST_HEAD);
 }
 
-// In software; on a GPU the step has counted already.
 static int count(struct fill *f, enum listing listed)
 {
-    if (f->d->base.info.hardware)
-        return PATINA_OK;
     f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][COUNT], 0, (GLuint)listed);
     return pt_gl_dispatch(f->d, PT_KERNEL_fill, COUNT, 1, 1);
 }
@@ -137,12 +133,10 @@ static int fill_step(struct fill *f)
     return result == PATINA_OK ? count(f, WOKEN) : result;
 }
 
-// Whether the list of a head is empty: in software, which has done its work, so looking has nobody wait, and steps over nothing take time.
+// Whether the list of a head is empty. Software has done its work: looking has nobody wait.
 static int is_over(struct fill *f, enum pt_gl_scratch_use use, uint32_t head)
 {
     uint32_t walk[PT_GL_LIST_HEAD / 4] = {0};
-    if (f->d->base.info.hardware)
-        return 0;
     pt_gl_read(f->d, f->d->scratch[use].name, head * PT_GL_LIST_HEAD, sizeof walk, walk);
     return !walk[3];
 }
@@ -194,6 +188,8 @@ int pt_gl_fill(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     const struct fill_args *args = work->arguments;
     int result = PATINA_OK;
+    if (d->base.info.hardware)
+        return pt_gl_fill_tiles(d, work);
     for (uint32_t phase = PT_FILL_BACKGROUND; phase <= PT_FILL_OCCLUDED && result == PATINA_OK; phase++) {
         if (!(args->phases & phase))
             continue;

@@ -9,8 +9,8 @@
 //   STEP 0: find the pixels to fill, empty or OCCLUDED ones (2: above level 0);   STEP 1: what they become;
 //   STEP 2: apply;   STEP 3: the tiles for the next step;
 //   STEP 4: mark;   STEP 5: restore;   STEP 6: the entries for the next step;
-//   STEP 7: how many workgroups walk what a step has listed. On a GPU the last workgroup of that step does it; software's barriers
-//   cost more than a dispatch
+//   STEP 7: how many workgroups walk what a step has listed
+// That is software's way. On a GPU lib/fill_tiles.glsl takes many steps a dispatch.
 #version 430 core
 #include "shared/filling.h"
 #include "lib/math.glsl"
@@ -42,7 +42,6 @@ layout(std430, binding = BIND_keys) writeonly buffer keys_block { uvec2 keys[]; 
 layout(std430, binding = BIND_from) writeonly buffer from_block { uint from[]; };
 layout(std430, binding = BIND_walks) coherent buffer walks_block {
     walk changes, applies, saves, tiles, looks;
-    uint finished; // workgroups of this step
 };
 layout(std430, binding = BIND_changed) buffer changed_block { change changed[]; };
 layout(std430, binding = BIND_saved) buffer saved_block { saved_pixel saved[]; };
@@ -53,13 +52,9 @@ layout(std430, binding = BIND_woken) coherent buffer woken_block { walk wakes; u
 layout(location = 0) uniform uint listed;  // STEP 7: by which step
 layout(location = 1) uniform uint stamp;   // of this step
 layout(location = 2) uniform uint columns; // tiles in a row
-layout(location = 3) uniform uint most;    // STEP 0, 3, 7: tiles
+layout(location = 3) uniform uint most;    // STEP 3, 7: tiles
 layout(location = 4) uniform uint all;     // STEP 4: 1: look at all
 layout(location = 5) uniform uint phase;   // STEP 1, 2, 4: PT_FILL_*
-
-// The ring, anticlockwise from east.
-const ivec2 ring[8] = ivec2[8](ivec2(1, 0), ivec2(1, 1), ivec2(0, 1), ivec2(-1, 1), ivec2(-1, 0), ivec2(-1, -1),
-                               ivec2(0, -1), ivec2(1, -1));
 
 // Outside the plane: nothing.
 float z_at(ivec2 size, int x, int y)
@@ -68,6 +63,16 @@ float z_at(ivec2 size, int x, int y)
     float z = read_z(inside ? uint(y * size.x + x) : 0u);
     return inside ? z : pt_float(PT_KEY_EMPTY_Z);
 }
+
+uvec2 key_at(ivec2 size, ivec2 place) { return read_key(uint(place.y * size.x + place.x)); }
+uint from_at(ivec2 size, ivec2 place) { return texelFetch(from_plane, place.y * size.x + place.x).x; }
+
+float farthest_of(uint cell, uint source, float z_q)
+{
+    return pt_farthest(read_z(cell), texelFetch(from_plane, int(cell)).x, source, z_q);
+}
+
+#include "lib/closing.glsl"
 
 float own_distance(view_args view, uint source, float z)
 {
@@ -205,83 +210,21 @@ const uint NO_PIXEL = 0xFFFFFFFFu;
 
 #if STEP == 1
 
-// Whether the surface that a neighbour shows reaches the pixel.
-bool reaches(view_args view, ivec2 place, uvec2 key, uint source)
-{
-    float scale = float(1u << view.level), z = pt_float(key.y);
-    precise float width = view.perspective != 0u ? view.footprint * z : view.footprint;
-    float share = key.x >= args.discs_first ? args.disc_reach : args.reach;
-    vec2 ray = abs(pt_ray(view, place.x, place.y)); // how much wider than in the middle the picture shows what faces the eye
-    float stretch = view.perspective != 0u ? pt_max(pt_max(ray.x, ray.y), 1.0) : 1.0;
-    precise float way = (read_span(source) * share) * pt_rcp(width * read_float4(source).w);
-    precise float most = way * stretch + PT_FILL_SLACK * scale;
-    uvec2 at = pt_pixel(source, args.from_width);
-    precise float dx = (float(place.x) + 0.5) * scale - (float(at.x) + 0.5);
-    precise float dy = (float(place.y) + 0.5) * scale - (float(at.y) + 0.5);
-    precise float square = dx * dx + dy * dy, bound = most * most;
-    return square <= bound;
-}
-
-// The neighbour with the least key; with `reach` of those that reach the pixel and are nearer than `threshold`.
-uvec2 least_key(view_args view, ivec2 place, bool reach, float threshold, inout ivec2 best)
-{
-    ivec2 size = ivec2(view.width, view.height);
-    uvec2 key = uvec2(0xFFFFFFFFu);
-    for (int d = 0; d < 8; d++) {
-        ivec2 at = place + ring[d];
-        bool inside = at.x >= 0 && at.y >= 0 && at.x < size.x && at.y < size.y;
-        at = inside ? at : place;
-        uvec2 other = read_key(uint(at.y * size.x + at.x));
-        bool less = inside && pt_key_less(other, key);
-        if (reach && less)
-            less = pt_float(other.y) < threshold && reaches(view, place, other, texelFetch(from_plane, at.y * size.x + at.x).x);
-        key = less ? other : key;
-        best = less ? at : best;
-    }
-    return key;
-}
-
-// z at a pixel of the surface that its neighbour `best` shows at z_q: of its tangent plane, within the cloud.
-float refined_z(view_args view, ivec2 place, ivec2 best, uint source, float z_q)
-{
-    ivec2 size = ivec2(view.width, view.height);
-    vec4 normal = read_float4(source);
-    float z = pt_plane_depth(view, normal.xyz, pt_ray(view, best.x, best.y), z_q, pt_ray(view, place.x, place.y),
-                             pt_level_distance(view, read_span(source), normal.w, z_q));
-    float farthest = pt_farthest(pt_cell_of(source, args.from_width, view.level, view.width), source, z_q);
-    if (farthest < z)
-        for (int d = 0; d < 8; d++)
-            farthest = pt_farther(farthest, z_at(size, place.x + ring[d].x, place.y + ring[d].y), z_q, z);
-    return pt_max(pt_min(z, farthest), z_q);
-}
-
 // 5. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
 void walk_list()
 {
     view_args view = args.view;
-    bool refined = args.refined != 0u, occluded = phase == PT_FILL_OCCLUDED, unfills = args.unfills != 0u;
-    ivec2 size = ivec2(view.width, view.height);
+    bool occluded = phase == PT_FILL_OCCLUDED, unfills = args.unfills != 0u;
     uint index = entry_index();
     if (index >= changes.count)
         return;
-    uint pixel = changed[index].pixel;
-    ivec2 place = ivec2(pt_pixel(pixel, view.width));
-    ivec2 best = place;
-    uvec2 old_key = read_key(pixel);
+    uint pixel = changed[index].pixel, source;
+    uvec2 key, old_key = read_key(pixel);
     uint old_from = texelFetch(from_plane, int(pixel)).x;
     precise float threshold = pt_float(old_key.y);
     if (occluded && (unfills || args.reach > 0.0))
         threshold = threshold - own_distance(view, old_from & ~PT_FROM_MIXED, threshold);
-    uvec2 key = least_key(view, place, false, threshold, best);
-    uint source = texelFetch(from_plane, best.y * size.x + best.x).x;
-    bool taken = args.reach == 0.0 || reaches(view, place, key, source);
-    if (!taken) {
-        key = least_key(view, place, true, threshold, best);
-        source = texelFetch(from_plane, best.y * size.x + best.x).x;
-        taken = key != uvec2(0xFFFFFFFFu);
-    }
-    if (refined && taken)
-        key.y = pt_bits(refined_z(view, place, best, source, pt_float(key.y)));
+    bool taken = close_pixel(view, ivec2(pt_pixel(pixel, view.width)), threshold, key, source);
     changed[index] = change(taken ? pixel : NO_PIXEL, key.x, key.y, source);
 }
 
@@ -397,13 +340,7 @@ void walk_list()
 
 // ---- how many workgroups walk what ----------------------------------------------------------------------------------------
 
-#ifdef PT_SOFTWARE
-#define COUNTS (STEP == 7)
-#else
-#define COUNTS (STEP == 0 || STEP == 3 || STEP == 4 || STEP == 6 || STEP == 7)
-#endif
-
-#if COUNTS
+#if STEP == 7
 
 // How many workgroups of 64 there are for so many.
 void count_groups(inout walk w, uint count)
@@ -440,26 +377,10 @@ void count_lists(uint step)
     }
 }
 
-#endif
-
-#if STEP == 7
-
 void main() { count_lists(listed); }
 
 #else
 
-void main()
-{
-    walk_list();
-#if COUNTS
-    memoryBarrierBuffer();
-    barrier();
-    if (gl_LocalInvocationIndex == 0u && atomicAdd(finished, 1u) + 1u == gl_NumWorkGroups.x * gl_NumWorkGroups.y) {
-        memoryBarrierBuffer();
-        count_lists(uint(STEP));
-        finished = 0u;
-    }
-#endif
-}
+void main() { walk_list(); }
 
 #endif

@@ -118,7 +118,8 @@ void take(view_args view, uint coarse_width, bool refined, uint at)
         view_args coarse = view;
         coarse.level++;
         float limit = pt_level_distance(coarse, read_span(source), normal.w, z);
-        float farthest = pt_farthest(pt_cell_of(source, args.from_width, coarse.level, coarse_width), source, z);
+        uint measured = pt_cell_of(source, args.from_width, coarse.level, coarse_width);
+        float farthest = pt_farthest(read_z(measured), texelFetch(from_plane, int(measured)).x, source, z);
         float plane = pt_plane_depth(view, normal.xyz, pt_ray(coarse, cell.x, cell.y), z, pt_ray(view, place.x, place.y), limit);
         ivec2 size = ivec2(coarse_width, args.coarse_height), side = (place & 1) * 2 - 1;
         if (farthest < plane) {

@@ -35,11 +35,11 @@ float read_span(uint pixel) { return uintBitsToFloat(texelFetch(word_plane, int(
 vec4 read_float4(uint pixel) { return texelFetch(float4_plane, int(pixel)); }
 
 // How far z of a filled surface goes at most: as far beyond where it was measured as its span reaches along it. Where that cell of
-// the level shows something else by now, as far as z_q.
-float pt_farthest(uint cell, uint source, float z_q)
+// the level shows something else by now, as far as z_q. z, from: what the cell shows.
+float pt_farthest(float z, uint from, uint source, float z_q)
 {
-    precise float farthest = read_z(cell) + read_span(source) * pt_rcp(read_float4(source).w);
-    return texelFetch(from_plane, int(cell)).x == source ? farthest : z_q;
+    precise float farthest = z + read_span(source) * pt_rcp(read_float4(source).w);
+    return from == source ? farthest : z_q;
 }
 
 // Or as far as what lies beside a pixel at z, if no farther from z than z from z_q: a gap's other side, or what is to hide a rim.
