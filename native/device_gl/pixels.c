@@ -156,7 +156,24 @@ struct tail_args {
     struct smooth_args smooth;
     struct antialias_args antialias;
     struct compose_args compose;
+    uint32_t walked[4];
 };
+
+// On a GPU the picture's background is written as well: the rectangle grows by the crop.
+static void find_walked(const struct pt_gl_device *d, struct tail_args *args)
+{
+    const struct compose_args *c = &args->compose;
+    uint32_t *walked = args->walked;
+    memcpy(walked, args->smooth.view.rect, sizeof args->walked);
+    if (!d->base.info.hardware)
+        return;
+    if (walked[2] <= walked[0] || walked[3] <= walked[1])
+        memcpy(walked, (const uint32_t[]){c->crop_x, c->crop_y, c->crop_x, c->crop_y}, sizeof args->walked);
+    walked[0] = c->crop_x < walked[0] ? c->crop_x : walked[0];
+    walked[1] = c->crop_y < walked[1] ? c->crop_y : walked[1];
+    walked[2] = c->crop_x + c->crop_width > walked[2] ? c->crop_x + c->crop_width : walked[2];
+    walked[3] = c->crop_y + c->crop_height > walked[3] ? c->crop_y + c->crop_height : walked[3];
+}
 
 static int bind_tail(struct pt_gl_device *d, const struct tail_args *args, const struct pt_bound_pass *passes,
                      const struct pt_buffer *shaded)
@@ -180,23 +197,29 @@ static int bind_tail(struct pt_gl_device *d, const struct tail_args *args, const
 // What shows no point is background; the rest is smoothed into the picture, and then its edges.
 int pt_gl_tail(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded)
 {
-    const struct tail_args args = {*(const struct smooth_args *)passes[0].arguments,
-                                   *(const struct antialias_args *)passes[1].arguments,
-                                   *(const struct compose_args *)passes[2].arguments};
+    struct tail_args args = {.smooth = *(const struct smooth_args *)passes[0].arguments,
+                             .antialias = *(const struct antialias_args *)passes[1].arguments,
+                             .compose = *(const struct compose_args *)passes[2].arguments};
+    const int hardware = (int)d->base.info.hardware;
     static const char *const definitions[] = {"#define STEP 0\n#define INKED 0\n", "#define STEP 1\n#define INKED 0\n",
                                               "#define STEP 0\n#define INKED 1\n", "#define STEP 1\n#define INKED 1\n"};
     const struct pt_buffer *combined = passes[2].buffers[PT_BUF_compose_combined];
     const uint32_t find = 2 * (args.antialias.inked != 0);
     uint32_t words[4];
     memcpy(words, args.compose.background, sizeof words);
-    int result = pt_gl_clear(d, combined->name, 0, combined->size, words);
+    find_walked(d, &args);
+    struct view_args view = args.smooth.view;
+    memcpy(view.rect, args.walked, sizeof view.rect);
+    int result = hardware ? PATINA_OK : pt_gl_clear(d, combined->name, 0, combined->size, words);
     if (result == PATINA_OK)
-        result = pt_gl_tiles(d, passes[0].buffers[PT_BUF_smooth_keys], &args.smooth.view);
-    for (uint32_t i = find; i < find + 2 && result == PATINA_OK; i++)
+        result = pt_gl_tiles(d, passes[0].buffers[PT_BUF_smooth_keys], &view);
+    for (uint32_t i = find; i < find + (hardware ? 1 : 2) && result == PATINA_OK; i++)
         if (!d->programs[PT_KERNEL_compose][TAIL + i])
             result = pt_gl_program(d, "lib/tail.glsl", definitions[i], &d->programs[PT_KERNEL_compose][TAIL + i]);
     if (result == PATINA_OK)
         result = bind_tail(d, &args, passes, shaded);
+    if (result == PATINA_OK && hardware)
+        return pt_gl_dispatch_tiles(d, PT_KERNEL_compose, TAIL + find, PT_GL_TILES_POINTS);
     if (result == PATINA_OK)
         result = make_list(d, PT_BIND_tail_edges, TILE_PIXELS, PT_KERNEL_compose, TAIL + find, GROUP);
     return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_compose, TAIL + find + 1) : result;
@@ -222,6 +245,8 @@ int pt_gl_push(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     (void)work;
     int result = pt_gl_kernel_program(d, PT_KERNEL_push, COVERED, "#define STEP 0\n");
+    if (d->base.info.hardware)
+        return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_push, COVERED, PT_GL_TILES_POINTS) : result;
     if (result == PATINA_OK)
         result = pt_gl_kernel_program(d, PT_KERNEL_push, TAKE, "#define STEP 1\n");
     if (result == PATINA_OK) // a tile has twice the columns of a tile of its own level

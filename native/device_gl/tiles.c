@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which tiles of a key plane hold points: filters visit no others. The lists last as long as the keys do not change.
+// Which tiles of a key plane hold points: in software filters visit no others. The lists last as long as the keys do not change. On a GPU
+// filters visit all tiles: a dispatch takes longer than those that are empty.
 #include "device_gl.h"
 
 #include <string.h>
@@ -70,6 +71,8 @@ int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const stru
         return PATINA_OK;
     t->columns = (t->rect[2] - t->rect[0] + TILE - 1) / TILE;
     t->rows = (t->rect[3] - t->rect[1] + TILE - 1) / TILE;
+    if (d->base.info.hardware)
+        return PATINA_OK;
     int result = programs(d);
     if (result == PATINA_OK)
         result = room(d, t);
@@ -85,6 +88,11 @@ int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 {
     const struct pt_gl_tiles *t = &d->tiles;
     const size_t tiles = (size_t)t->columns * t->rows, head = list * t->stride * 4;
+    if (d->base.info.hardware) {
+        uint32_t x, y;
+        pt_gl_grid((uint32_t)((tiles + GROUP / TILE - 1) / (GROUP / TILE)), &x, &y);
+        return pt_gl_dispatch(d, kernel, variant, x, y);
+    }
     return tiles ? pt_gl_dispatch_tile_list(d, kernel, variant, d->scratch[PT_GL_SCRATCH_TILE_LISTS].name, head, tiles)
                  : PATINA_OK;
 }

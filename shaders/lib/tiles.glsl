@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Filters walk a list of tiles, 8 x 8 pixels each, counted from view.rect's corner: pt_gl_tiles lists those that hold
-// something. A workgroup takes four tiles and an invocation a line of one, so that what is read once a kernel is read
+// Filters walk tiles, 8 x 8 pixels each, counted from view.rect's corner: in software a list of those that hold something,
+// which pt_gl_tiles makes, on a GPU all of them: making the list costs more dispatches than it saves pixels. A workgroup takes four tiles and an invocation a line of one, so that what is read once a kernel is read
 // once for eight pixels. (llvmpipe runs masked lanes to the end: leaving background out of the list is what skips it.)
 #ifndef PT_TILES_GLSL
 #define PT_TILES_GLSL
@@ -17,21 +17,37 @@ layout(local_size_x = 64) in;
 layout(local_size_x = 32) in; // four tiles' lines
 #endif
 
+#ifdef PT_SOFTWARE
 layout(std430, binding = BIND_tile_list) readonly buffer tile_list_block {
     uint tile_groups[3], tile_count; // the list's head
     uint tile_list[];
 };
 layout(location = 15) uniform uint tile_columns; // tiles in a row of the rectangle
+#endif
+
+// Column and row of the tile that comes at `index`. False: there are no more.
+bool pt_tile_at(uvec4 rect, uint index, out uvec2 tile)
+{
+#ifdef PT_SOFTWARE
+    tile = pt_pixel(tile_list[min(index, tile_count - 1u)], tile_columns);
+    return index < tile_count;
+#else
+    uvec2 tiles = (rect.zw - rect.xy + (PT_TILE - 1u)) / PT_TILE;
+    tile = pt_pixel(index, tiles.x);
+    return index < tiles.x * tiles.y;
+#endif
+}
+
+uint pt_tile_group() { return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * PT_TILES_IN_GROUP; }
 
 // The first pixel of this invocation's line; the others follow PT_STEP apart.
 uvec2 pt_tile_line(view_args view)
 {
-    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, lane = gl_LocalInvocationID.x;
-    uint index = group * PT_TILES_IN_GROUP + lane / PT_TILE;
-    uint tile = tile_list[min(index, tile_count - 1u)];
-    uvec2 corner = uvec2(view.rect[0], view.rect[1]) + pt_pixel(tile, tile_columns) * PT_TILE;
-    uvec2 line = corner + lane % PT_TILE * PT_ACROSS;
-    return index < tile_count ? line : uvec2(view.rect[2], view.rect[3]); // beyond the list: an empty line
+    uint lane = gl_LocalInvocationID.x;
+    uvec2 tile;
+    bool there = pt_tile_at(uvec4(view.rect[0], view.rect[1], view.rect[2], view.rect[3]), pt_tile_group() + lane / PT_TILE, tile);
+    uvec2 line = uvec2(view.rect[0], view.rect[1]) + tile * PT_TILE + lane % PT_TILE * PT_ACROSS;
+    return there ? line : uvec2(view.rect[2], view.rect[3]); // beyond the last: an empty line
 }
 
 // How many pixels of the line lie in the rectangle.
