@@ -86,10 +86,10 @@ struct pt_gl_device {
     void *context;
     int lost;
     char message[512];
-    size_t block_size; // greatest storage block
-    size_t largest;    // buffer that there is memory for, as tests have it
-    size_t alignment;  // of a block's or a texture's offset in its buffer
-    size_t texels;     // in a buffer texture
+    size_t block_size;  // greatest storage block
+    size_t largest;     // buffer that there is memory for, as tests have it
+    size_t alignment;   // of a block's or a texture's offset in its buffer
+    size_t texels;      // in a buffer texture
     size_t shared_size; // bytes that the invocations of a workgroup share
     GLuint arguments;
     GLuint srgb;    // uniform block: linear values of the 256 sRGB bytes

@@ -6,8 +6,12 @@
 
 #include <stdio.h>
 
-enum { PROGRAMS = PT_GL_VARIANTS - 2 };          // of fill's, the first of lib/fill_tiles.glsl: a phase each
-enum { PIXEL = 12, REST = 128, MOST_SIDE = 64 }; // shared bytes a pixel, and beside all of them; invocations hold four pixels each
+enum { PROGRAMS = PT_GL_VARIANTS - 2 }; // of fill's, the first of lib/fill_tiles.glsl: a phase each
+enum {
+    PIXEL = 12,
+    REST = 128,
+    MOST_SIDE = 64
+}; // shared bytes a pixel, and beside all of them; invocations hold four pixels each
 
 // A pair of planes: where they lie.
 struct state {
