@@ -26,7 +26,7 @@ ERROR = {"OK": 0, "ERROR_ARGUMENT": -1, "ERROR_MEMORY": -2, "ERROR_FILE": -3, "E
 TYPE = {"NONE": 0, "FLOAT32": 1, "FLOAT64": 2, "UINT8": 3, "UINT16": 4, "UINT32": 5, "INT8": 6, "INT16": 7, "INT32": 8}
 KIND = {"UNKNOWN": 0, "SURFACE": 1, "BORDER": 2, "LINE": 3, "VOLUME": 4, "STRAY": 5}
 LIGHTING = {"AUTO": 0, "UNLIT": 1, "LIT": 2}
-COLOR_SOURCE = {"OWN": 0, "FIXED": 1, "SCALAR": 2, "HEIGHT": 3, "OBJECT_HEIGHT": 4, "DISTANCE": 5}
+COLOR_SOURCE = {"OWN": 0, "FIXED": 1, "SCALAR": 2, "HEIGHT": 3, "OBJECT_HEIGHT": 4, "DISTANCE": 5, "TRUST": 6}
 FREE_SPACE = {"OFF": 0, "SHOW": 1, "USE": 2}
 SOFT = {"OFF": 0, "ALL": 1, "FIELD": 2}
 SOFT_MODEL = {"BASE": 0, "CONCENTRIC": 1, "EXPRESS": 2, "SPLATS": 3, "ONE_LAYER": 4}
@@ -187,7 +187,7 @@ class FrameStats(Descriptor):
                 ("chunks_cut", c_uint64), ("pixel_samples", c_uint32), ("pixel_pending", c_uint32),
                 ("pixel_error", c_float), ("mapped_bytes", c_uint64), ("mapped_cap", c_uint64), ("mapped_held", c_uint64),
                 ("mapped_read", c_uint64), ("mapped_rounds", c_uint32), ("mapped_returned", c_uint32),
-                ("points_lost", c_uint64), ("untrusted", c_uint64)]
+                ("points_lost", c_uint64), ("untrusted", c_uint64), ("none_trusted", c_uint64)]
 
 
 class Panorama(Descriptor):

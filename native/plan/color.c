@@ -45,6 +45,8 @@ static struct span span_of_boxes(const struct patina_scene *scene, const struct 
 static struct span span_of(const struct patina_scene *scene, const struct pt_instance *instance)
 {
     const float *range = instance->style.ramp_range;
+    if (range[0] == range[1] && instance->style.color_source == PATINA_COLOR_TRUST)
+        return (struct span){0.0, 1.0};
     if (range[0] == range[1] && instance->style.color_source != PATINA_COLOR_SCALAR)
         return span_of_boxes(scene, instance);
     if (range[0] == range[1])
@@ -124,6 +126,13 @@ static void set_ramp(struct pt_builder *builder, const struct pt_instance *insta
     pt_plan_ramp(builder, own ? instance->style.ramp : grey, own ? instance->style.ramp_count : 2, out);
 }
 
+struct pt_ref pt_colors_of(const struct pt_plan_instance *planned, uint32_t i, const struct recolor_args *recolor)
+{
+    return recolor->source == PT_RAMP_TRUST    ? pt_shapes_of(planned, i)
+           : recolor->source == PT_RAMP_SCALAR ? pt_buffer_of(PT_SCALARS, i)
+                                               : pt_buffer_of(PT_COLORS, i);
+}
+
 void pt_plan_recolor(struct pt_builder *builder, const struct pt_plan_instance *planned, struct shade_args *args)
 {
     const struct pt_instance *instance = planned->instance;
@@ -134,15 +143,17 @@ void pt_plan_recolor(struct pt_builder *builder, const struct pt_plan_instance *
     out->contrast = style->contrast;
     if (style->color_source == PATINA_COLOR_OWN)
         return;
-    args->instance.color_format = style->color_source == PATINA_COLOR_SCALAR ? PT_COLOR_OF_SCALAR : 0;
+    const int trust = style->color_source == PATINA_COLOR_TRUST && instance->cloud->info.has_shapes;
+    args->instance.color_format = style->color_source == PATINA_COLOR_SCALAR || trust ? PT_COLOR_OF_SCALAR : 0;
     args->instance.has_opacities = planned->args.has_opacities; // discs: the point's own, as its colour
-    if (style->color_source == PATINA_COLOR_FIXED)
+    if (style->color_source == PATINA_COLOR_FIXED || (style->color_source == PATINA_COLOR_TRUST && !trust))
         return;
     struct span span = span_of(builder->scene, instance);
     double slope = span.most != span.least ? 1.0 / (span.most - span.least) : 0.0;
     slope = fabs(slope) < 1e30 ? slope : 0.0;
     set_ramp(builder, instance, out);
-    out->source = style->color_source == PATINA_COLOR_SCALAR     ? PT_RAMP_SCALAR
+    out->source = trust                                          ? PT_RAMP_TRUST
+                  : style->color_source == PATINA_COLOR_SCALAR   ? PT_RAMP_SCALAR
                   : style->color_source == PATINA_COLOR_DISTANCE ? PT_RAMP_DISTANCE
                                                                  : PT_RAMP_PLACE;
     out->zero = (float)span.least;

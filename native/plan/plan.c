@@ -49,15 +49,14 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     if (shown)
         pt_plan_recolor(builder, instance, &args);
     int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE || args.instance.color_format == PT_COLOR_OF_PIXEL;
-    enum pt_instance_buffer colors = args.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
-    struct pt_pass *pass = PT_ADD(builder, shade, args,
-                                  {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
-                                   pt_span_of(plan), of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i),
-                                   pt_shading_of(builder), pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i),
-                                   args.of_pixels ? pt_plane_at(PT_PLANE_LIGHT, 0) : pt_buffer_of(PT_SHADOWS, instance->of),
-                                   args.of_pixels ? pt_nothing() : pt_marks_of(builder, instance->of),
-                                   pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0), pt_light_of(builder, &args),
-                                   pt_ramps_of(&args)});
+    struct pt_pass *pass = PT_ADD(
+        builder, shade, args,
+        {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0), pt_span_of(plan),
+         of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_colors_of(instance, i, &args.recolor), pt_shading_of(builder),
+         pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i),
+         args.of_pixels ? pt_plane_at(PT_PLANE_LIGHT, 0) : pt_buffer_of(PT_SHADOWS, instance->of),
+         args.of_pixels ? pt_nothing() : pt_marks_of(builder, instance->of),
+         pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0), pt_light_of(builder, &args), pt_ramps_of(&args)});
     pass->late = pt_shade_late(&args, PT_LATE_POINTS);
     PT_REASON(pass, "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
               args.instance.lit ? "lit" : "unlit", args.light_count, args.blend, args.recolor.source ? ", ramp" : "");

@@ -501,6 +501,8 @@ void pt_plan_tint(struct pt_builder *builder, enum pt_plane color); // passes on
 
 // The instance's ramp, exposure and contrast, and the format of what shade reads for its colours.
 void pt_plan_recolor(struct pt_builder *builder, const struct pt_plan_instance *instance, struct shade_args *args);
+// What shading takes the colours of instance i from: its own, its scalars, or its shape words.
+struct pt_ref pt_colors_of(const struct pt_plan_instance *instance, uint32_t i, const struct recolor_args *recolor);
 // Puts a ramp, of linear RGB, into the plan's table, unless it is there.
 void pt_plan_ramp(struct pt_builder *builder, const float *ramp, uint32_t entries, struct recolor_args *out);
 

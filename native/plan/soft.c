@@ -325,11 +325,10 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
     if (style->soft_modulation > 0.0f) // without a field all is 1
         args.weight = style->soft == PATINA_SOFT_FIELD ? fminf(1.0f / (style->soft_modulation * PT_FIELD_MOST), 1.0f)
                                                        : fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
-    const enum pt_instance_buffer colors = args.shade.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
     struct pt_ref refs[8 + PT_KIND_BUFFERS] = {pt_plane_at(PT_PLANE_SOFT_POINTS, 0)};
     uint32_t count = 1 + pt_bind_kind(PT_AS_SOFT, i, refs + 1);
     refs[count++] = pt_field_of(instance, i);
-    refs[count++] = pt_buffer_of(colors, i);
+    refs[count++] = pt_colors_of(instance, i, &args.shade.recolor);
     refs[count++] = pt_buffer_of(PT_OPACITIES, i);
     refs[count++] = late ? pt_buffer_of(PT_SHADOWS, instance->of) : pt_nothing();
     refs[count++] = args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();

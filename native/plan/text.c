@@ -176,7 +176,7 @@ static void put_memory(struct text *text, const struct pt_plan *plan)
 size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char *buffer, size_t size)
 {
     struct text text = {buffer, size, 0};
-    uint64_t untrusted = 0;
+    uint64_t untrusted = 0, none_trusted = 0;
     for (uint32_t i = 0; i < plan->light_count; i++)
         pt_plan_light_text(scene, plan, i); // without memory it stays untold
     put_line(&text, 0, "planes %u x %u, crop %u x %u at %u, %u, %u coarse levels", plan->view.width, plan->view.height,
@@ -187,10 +187,14 @@ size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char
     put_line(&text, 0, "points %llu, scattered %llu, chunks %llu, culled %llu", (unsigned long long)plan->points,
              (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
              (unsigned long long)plan->chunks_culled);
-    for (uint32_t i = 0; i < scene->cloud_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         untrusted += pt_untrusted(&scene->instances[i]);
+        none_trusted += pt_none_trusted(&scene->instances[i]);
+    }
     if (untrusted)
         put_line(&text, 0, "untrusted points left out %llu", (unsigned long long)untrusted);
+    if (none_trusted)
+        put_line(&text, 0, "untrusted points drawn, for no other is in their cloud %llu", (unsigned long long)none_trusted);
     if (plan->chunks_clipped || plan->chunks_cut)
         put_line(&text, 0, "chunks clipped %llu, cut %llu", (unsigned long long)plan->chunks_clipped,
                  (unsigned long long)plan->chunks_cut);

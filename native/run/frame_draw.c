@@ -34,8 +34,10 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                         .chunks_cut = plan->chunks_cut,
                                         .pixel_samples = 1,
                                         .ms = ms};
-    for (uint32_t i = 0; i < scene->cloud_count; i++)
+    for (uint32_t i = 0; i < scene->cloud_count; i++) {
         shown->stats.untrusted += pt_untrusted(&scene->instances[i]);
+        shown->stats.none_trusted += pt_none_trusted(&scene->instances[i]);
+    }
     shown->peak = plan->peak;
     shown->soft_parts = plan->soft.part_count;
     shown->soft_records = plan->soft.records;

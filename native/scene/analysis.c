@@ -340,8 +340,6 @@ static int judge(struct walk *walk, struct pt_pool *pool)
     if (pt_progress_cancelled(walk->progress))
         return PATINA_ERROR_CANCELLED;
     const int error = pt_trust_hide(&walk->trust);
-    if (!error && walk->trust.hidden_count && walk->trust.hidden_count == walk->cloud->info.drawn)
-        pt_log(PT_LOG_WARNING, "No point of the cloud is trusted, so all of them are drawn. It may hold strays alone.");
     if (!error && walk->trust.hidden_count && walk->trust.hidden_count < walk->cloud->info.drawn) {
         atomic_store(&walk->done, 0);
         pt_parallel(pool, walk->cloud->chunk_count, 1, walk_touched, walk);

@@ -52,22 +52,35 @@ static uint64_t below(const patina_cloud_info *info, uint32_t level)
     return count;
 }
 
-uint32_t pt_trusted_from(const struct pt_instance *instance)
+// The least level that the style wants, whether the cloud has points of it or not. 0 of a cloud that was not analysed.
+static uint32_t wanted_level(const struct pt_instance *instance)
 {
     static const double slack = 1e-4; // the levels in float32 are what they are
-    const patina_cloud_style *style = &instance->style;
     const patina_cloud_info *info = &instance->cloud->info;
-    const double usual = pt_trust_of_level(pt_default_level(info->trusts));
-    double least = style->least_trust == 0.0f ? usual : (double)style->least_trust;
+    const double least = (double)instance->style.least_trust;
     uint32_t level = 0;
     if (!info->has_shapes)
         return 0;
-    if (style->hidden_kinds >> PATINA_KIND_STRAY & 1u)
-        least = fmax(least, usual);
+    if (least == 0.0)
+        return pt_default_level(info->trusts);
     while (level < PT_TRUST_LEVELS - 1 && pt_trust_of_level(level) < least - slack)
         level++;
+    return level;
+}
+
+uint32_t pt_trusted_from(const struct pt_instance *instance)
+{
+    const patina_cloud_info *info = &instance->cloud->info;
+    const uint32_t level = wanted_level(instance);
     const uint64_t untrusted = below(info, level);
     return untrusted && untrusted < below(info, PT_TRUST_LEVELS) ? level : 0;
+}
+
+uint64_t pt_none_trusted(const struct pt_instance *instance)
+{
+    const patina_cloud_info *info = &instance->cloud->info;
+    const uint64_t untrusted = below(info, wanted_level(instance));
+    return untrusted == below(info, PT_TRUST_LEVELS) ? untrusted : 0;
 }
 
 uint64_t pt_untrusted(const struct pt_instance *instance) { return below(&instance->cloud->info, pt_trusted_from(instance)); }

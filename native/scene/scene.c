@@ -87,7 +87,7 @@ static void *grow(void *array, uint32_t count, uint32_t *room, size_t size)
 
 static int check_color(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
 {
-    if (style->color_source > PATINA_COLOR_DISTANCE)
+    if (style->color_source > PATINA_COLOR_TRUST)
         return fail(scene, "cloud style: no such color_source");
     if (style->color_source == PATINA_COLOR_SCALAR && !cloud->info.has_scalars)
         return fail(scene, "cloud style: a ramp over scalars, and the cloud has none");

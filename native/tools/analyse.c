@@ -41,6 +41,15 @@ static void release(struct columns *c)
     free(c->seen_through);
 }
 
+// How many points are below the least trust, of those whose trust is known.
+static uint64_t count_untrusted(const struct columns *c)
+{
+    uint64_t untrusted = 0;
+    for (uint64_t i = 0; i < c->count; i++)
+        untrusted += c->kind[i] && (double)c->trust[i] < c->least - 1e-4;
+    return untrusted;
+}
+
 static int is_left_out(const struct columns *c, uint64_t i) { return c->trusted && (double)c->trust[i] < c->least - 1e-4; }
 
 static uint64_t count_written(const struct columns *c)
@@ -146,6 +155,12 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, int gri
     if (!code)
         code = patina_cloud_neighbourhoods(cloud, &wanted, NULL);
     int result = code ? tool_failed(in, NULL, code) : TOOL_OK;
+    const uint64_t untrusted = code ? 0 : count_untrusted(columns);
+    if (untrusted && untrusted == built.drawn) {
+        tool_say("warning: %s: none of %llu points is trusted, so all of them are kept: they may be strays alone", in,
+                 (unsigned long long)untrusted);
+        columns->trusted = 0;
+    }
     tool_cancellable(NULL, NULL);
     const int error = code ? 0 : write_ply(out, columns, info.origin);
     if (error) {
@@ -155,9 +170,6 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, int gri
     } else if (!code) {
         for (int i = 0; i < 6; i++)
             printf("%-12s %llu\n", tool_kinds[i], (unsigned long long)built.kinds[i]);
-        uint64_t untrusted = 0;
-        for (uint64_t i = 0; i < columns->count; i++)
-            untrusted += columns->kind[i] && (double)columns->trust[i] < columns->least - 1e-4;
         printf("%-12s %llu\n", "untrusted", (unsigned long long)untrusted);
         if (desc.free_space)
             printf("seen_through %llu\n", (unsigned long long)built.seen_through);

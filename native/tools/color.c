@@ -20,6 +20,7 @@ static int parse_ramp(const char *text, struct tool_color *color)
     color->attribute[length] = 0;
     color->source = !strcmp(color->attribute, "height")     ? PATINA_COLOR_HEIGHT
                     : !strcmp(color->attribute, "distance") ? PATINA_COLOR_DISTANCE
+                    : !strcmp(color->attribute, "trust")    ? PATINA_COLOR_TRUST
                                                             : PATINA_COLOR_SCALAR;
     color->has_range = comma != NULL;
     return comma && (parse_numbers(comma + 1, color->range, 2, 2) < 0 || color->range[0] == color->range[1]) ? -1 : 0;
@@ -41,10 +42,13 @@ static int parse_kinds(const char *text, uint32_t *hidden)
     for (;;) {
         const size_t length = strcspn(text, ",");
         uint32_t kind = 0;
-        while (kind < 6 && (strlen(tool_kinds[kind]) != length || memcmp(tool_kinds[kind], text, length)))
+        while (kind < PATINA_KIND_STRAY && (strlen(tool_kinds[kind]) != length || memcmp(tool_kinds[kind], text, length)))
             kind++;
-        if (kind == 6)
+        if (kind == PATINA_KIND_STRAY) {
+            if (length == strlen(tool_kinds[kind]) && !memcmp(tool_kinds[kind], text, length))
+                tool_say("--hide-kinds hides no strays: they are left out for their trust, see --trust");
             return -1;
+        }
         *hidden |= 1u << kind;
         if (!text[length])
             return 0;

@@ -87,7 +87,7 @@ static const struct topic {
      0},
     {"points", "color, transparency, and which points are drawn",
      "  --color R,G,B                      one linear color for all points\n"
-     "  --ramp height|distance|ATTRIBUTE[,MIN,MAX]   colors by height, distance to the eye, or a scalar of the file\n"
+     "  --ramp height|distance|trust|ATTRIBUTE[,MIN,MAX]   colors by height, distance to the eye, trust, or a scalar\n"
      "  --ramp-colors NAME                 viridis, grey, heat, spectrum, relief, diverging or classes (viridis)\n"
      "  --attribute NAME                   the scalar that --effect contour_source=attribute follows (the ramp's)\n"
      "  --exposure STOPS, --contrast C     of the points' colors, before light\n"
@@ -95,7 +95,7 @@ static const struct topic {
      "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"
      "  --layer-distance D                 least distance of two surfaces, world units (by the spacing)\n"
      "  --hide-classes N[,N...]            leaves out points of these classes\n"
-     "  --hide-kinds KIND[,KIND...]        leaves out kinds: unknown, surface, border, line, volume, stray\n"
+     "  --hide-kinds KIND[,KIND...]        leaves out kinds: unknown, surface, border, line, volume. Strays: --trust\n"
      "  --trust X                          leaves out points of less trust than X, 0 to 1 (automatic). 0 draws all points\n"
      "  --free-space off|show|use          points and closed surface that a scanner saw through: as they are, magenta, or\n"
      "                                     left out; for files with scanner positions (off)\n"

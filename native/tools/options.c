@@ -419,9 +419,9 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("--line-... options need --lines");
     if (tool_check_soft(&options->soft, options->file_count))
         return TOOL_USAGE;
-    if (options->analysis == TOOL_UNANALYSED &&
-        (options->color.free_space || options->color.hidden_kinds || options->color.least_trust > 0))
-        return tool_misuse("--free-space, --hide-kinds and --trust need the analysis");
+    if (options->analysis == TOOL_UNANALYSED && (options->color.free_space || options->color.hidden_kinds ||
+                                                 options->color.least_trust > 0 || options->color.source == PATINA_COLOR_TRUST))
+        return tool_misuse("--free-space, --hide-kinds, --trust and --ramp trust need the analysis");
     if (options->settings.surface != PATINA_SURFACE_RANGES && (options->range_gamma > 0.0 || options->range_pixel > 0.0 ||
                                                                options->range_sharpness > 0.0 || options->range_culling > 0.0))
         return tool_misuse("--range-... options need --surface ranges");

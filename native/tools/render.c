@@ -86,8 +86,8 @@ static int needs_analysis(const struct tool_options *options, int has_normals)
 {
     const struct tool_color *color = &options->color;
     return options->settings.surface != PATINA_SURFACE_RANGES || options->soft.model || color->free_space ||
-           color->hidden_kinds || color->least_trust > 0.0f || (options->cull && !has_normals) ||
-           options->pass == PATINA_PASS_TRUST || options->pass == PATINA_PASS_THICKNESS;
+           color->hidden_kinds || color->least_trust > 0.0f || color->source == PATINA_COLOR_TRUST ||
+           (options->cull && !has_normals) || options->pass == PATINA_PASS_TRUST || options->pass == PATINA_PASS_THICKNESS;
 }
 
 static int analyse(struct job *job, patina_cloud *cloud, const char *path, const struct tool_stations *stations)
@@ -379,10 +379,16 @@ static int run(struct job *job)
                  job->round, job->parts->next);
         return TOOL_AGAIN;
     }
+    if (!result && job->stats.none_trusted)
+        tool_say("warning: none of %llu points is trusted, so all of them are drawn: they may be strays alone (see --trust)",
+                 (unsigned long long)job->stats.none_trusted);
     if (!result && options->output) {
         if (!options->strip && write_picture(job))
             return TOOL_FAILED;
-        tool_say("%s: %llu points, %ux%u, %s, %.1f ms", options->output, (unsigned long long)job->stats.points,
+        char left_out[64] = "";
+        if (job->stats.untrusted)
+            snprintf(left_out, sizeof left_out, " (%llu left out for their trust)", (unsigned long long)job->stats.untrusted);
+        tool_say("%s: %llu points%s, %ux%u, %s, %.1f ms", options->output, (unsigned long long)job->stats.points, left_out,
                  job->stats.width, job->stats.height, job->device_info.name, ms);
     }
     if (!result && options->repeat)

@@ -180,7 +180,8 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     }
     printf("{\"device\": ");
     print_string(device);
-    printf(", \"untrusted\": %llu", (unsigned long long)stats->untrusted);
+    printf(", \"untrusted\": %llu, \"none_trusted\": %llu", (unsigned long long)stats->untrusted,
+           (unsigned long long)stats->none_trusted);
     printf(", \"points\": %llu, \"width\": %u, \"height\": %u", (unsigned long long)stats->points, stats->width, stats->height);
     printf(", \"ms_median\": %.4f, \"ms_min\": %.4f, \"ms_max\": %.4f", tool_times_median(times), least, most);
     printf(", \"passes\": {");

@@ -13,7 +13,7 @@ float place_on_ramp(view_args view, float eye_z, vec2 ray, float z, float scalar
 {
     float zero = args.recolor.zero, slope = args.recolor.along[0];
     precise float depth = z + eye_z;
-    if (args.recolor.source == PT_RAMP_SCALAR) {
+    if (args.recolor.source == PT_RAMP_SCALAR || args.recolor.source == PT_RAMP_TRUST) {
         precise float t = (scalar - zero) * slope;
         return t;
     }
@@ -27,6 +27,14 @@ float place_on_ramp(view_args view, float eye_z, vec2 ray, float z, float scalar
     precise float along = slope * across.x + args.recolor.along[1] * across.y;
     precise float t = (along - args.recolor.along[2] * depth) + zero;
     return t;
+}
+
+// Of a word of shapes.
+float trust_of_word(uint word)
+{
+    precise float doubt = float(15u - (word >> PT_SHAPE_TRUST_SHIFT & 15u));
+    precise float trust = (225.0 - doubt * doubt) * PT_TRUST_STEP;
+    return trust;
 }
 
 vec3 ramp_entry(uint i)
@@ -56,10 +64,12 @@ float graded(float color)
     return pt_max(pt_min(c, PT_BRIGHTEST), -PT_BRIGHTEST);
 }
 
-// In: the point's own colour; where scalars are the ramp's source, this in x.
+// In: the point's own colour; where scalars or words of shapes are the ramp's source, this in x.
 vec3 recolor(view_args view, float eye_z, vec2 ray, float z, vec3 style, vec3 color)
 {
     if (args.recolor.source != 0u) {
+        if (args.recolor.source == PT_RAMP_TRUST)
+            color.x = trust_of_word(pt_bits(color.x));
         bool nothing = args.recolor.source == PT_RAMP_SCALAR && (pt_bits(color.x) & 0x7FFFFFFFu) > 0x7F800000u;
         color = nothing ? style : ramp_color(place_on_ramp(view, eye_z, ray, z, color.x));
     }

@@ -17,6 +17,7 @@
 #define PT_RAMP_SCALAR 1u   // sources of a ramp
 #define PT_RAMP_PLACE 2u
 #define PT_RAMP_DISTANCE 3u
+#define PT_RAMP_TRUST 4u
 #define PT_MID_GREY 0.18f   // contrast turns around it
 #define PT_BRIGHTEST 65504.0f // half floats end there
 #define PT_MAX_LIGHTS 32
@@ -46,6 +47,8 @@ struct light_view {
 //   scalar: t = (scalar - zero) along.x; where it is NaN, the style colour
 //   place: t = ((along.x x + along.y y) + along.z z) + zero, in view space
 //   distance: t = (distance - zero) along.x, to the eye or (orthographic) to its plane
+//   trust: t = (trust - zero) along.x. The colours are words of shapes: color_format PT_COLOR_OF_SCALAR. No such word is NaN, for a
+//     kind is at most 5; where a driver takes one for 0, its level of trust is 0
 //   colour: entries evenly over t = 0..1, straight between
 //   graded: c = grey (gain c / grey)^contrast, at most PT_BRIGHTEST
 struct recolor_args {

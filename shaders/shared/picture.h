@@ -31,7 +31,6 @@ struct paper_args {
     float grain;
 };
 
-#define PT_TRUST_STEP 0.00444444455f // 1 / 225: level l of trust is 225 - (15 - l)^2 of these
 
 // assess: what is known of the point whose surface a pixel shows: its trust, 0..1, and its thickness, world units. 0 where
 // nothing is known, or nothing is. Visits view.rect, which lies within the crop.

@@ -23,6 +23,7 @@
 #define PT_SHAPE_TRUST_SHIFT 25
 #define PT_SHAPE_TRUST_BITS (15u << PT_SHAPE_TRUST_SHIFT)
 #define PT_TRUST_LEVELS 16
+#define PT_TRUST_STEP 0.00444444455f // 1 / 225: level l of trust is 225 - (15 - l)^2 of these
 #define PT_SHAPE_SIGHT_SHIFT 22     // kind, trust and seen through are a byte: what hides points is a set of such
 #define PT_SHAPE_SEEN_THROUGH (1u << 29) // a scanner looked through where it lies
 #define PT_SHAPE_UP -1e-4f // n.z of which s is 1

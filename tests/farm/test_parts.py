@@ -114,7 +114,7 @@ def test_parts_are_the_whole():
     check_parts("site.ply", *SMALL[1:])
     check_parts(*SMALL, "--ortho", "3", "--lines", "2", "--ramp", "height")
     check_parts(*SMALL, "--fill", "off", "--smooth", "off", "--antialias", "off", of=1)
-    check_parts(*SMALL, "--clip-box", "-1,-1,-1,1,1,1", "--clip-tint", "1,0,0,0.1", "--hide-kinds", "stray")
+    check_parts(*SMALL, "--clip-box", "-1,-1,-1,1,1,1", "--clip-tint", "1,0,0,0.1", "--hide-kinds", "volume", "--ramp", "trust")
     check_parts("site.cloud", "--size", "900x700", "--lit")  # some points are discs
     check_parts(*SMALL, "--average", "--camera", "200,5")
     check_parts(*SMALL, "--look", "0,0,9,0,0,20", of=2)  # nothing is in view

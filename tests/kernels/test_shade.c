@@ -350,14 +350,14 @@ static void directed(struct harness *h)
     }
 }
 
-// Ramps of all sources and lengths; scalars among which some are NaN and infinite; exposure and contrast.
+// Ramps of all sources and lengths; scalars among which some are NaN and infinite; words of shapes; exposure and contrast.
 static void ramps(struct harness *h)
 {
     static const uint32_t entries[] = {2, 7, 256};
-    for (uint32_t source = 0; source <= PT_RAMP_DISTANCE; source++)
+    for (uint32_t source = 0; source <= PT_RAMP_TRUST; source++)
         for (uint32_t i = 0; i < 6; i++) {
             struct rng rng = {source * 10 + i};
-            const int scalar = source == PT_RAMP_SCALAR;
+            const int trust = source == PT_RAMP_TRUST, scalar = source == PT_RAMP_SCALAR || trust;
             struct setup s = make(h, &rng, i % 2, i < 3 ? PICTURE_SURFACES : PICTURE_NOISE,
                                   scalar || source > 1 ? 0 : 1 + i % 2);
             struct recolor_args *recolor = &s.args.recolor;
@@ -371,7 +371,7 @@ static void ramps(struct harness *h)
             recolor->contrast = i == 3 ? 2.5f : i == 4 ? 0.3f : 1.0f;
             for (int k = 0; k < 3; k++)
                 recolor->along[k] = (float)rng_range(&rng, -0.4, 0.4);
-            recolor->zero = scalar ? -4.0f : source == PT_RAMP_DISTANCE ? 2.0f : 0.3f;
+            recolor->zero = trust ? 0.1f : scalar ? -4.0f : source == PT_RAMP_DISTANCE ? 2.0f : 0.3f;
             for (uint32_t k = 0; k < 3 * recolor->entries; k++)
                 s.ramps[3 * recolor->first + k] = (float)rng_unit(&rng);
             for (uint32_t k = 0; k < s.args.instance.slots && scalar; k++)
@@ -379,6 +379,10 @@ static void ramps(struct harness *h)
                                          : k % 50 == 8 ? INFINITY
                                          : k % 50 == 9 ? -INFINITY
                                                        : (float)rng_range(&rng, -6.0, 3.0);
+            for (uint32_t k = 0; k < s.args.instance.slots && trust; k++) // all levels and kinds, any classes
+                ((uint32_t *)s.colors)[k] = (uint32_t)(rng_unit(&rng) * 0x3FFFFF) | k % 6 << PT_SHAPE_KIND_SHIFT |
+                                            k % PT_TRUST_LEVELS << PT_SHAPE_TRUST_SHIFT | k % 3 << 30;
+            recolor->along[0] = trust ? 1.1f : recolor->along[0];
             check(h, &s, TOL_UNSURE_SHARE);
         }
 }

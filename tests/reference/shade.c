@@ -39,6 +39,12 @@ static int place_on_ramp(const struct shade_args *args, const struct ref_planes 
     const struct recolor_args *recolor = &args->recolor;
     double slope = recolor->along[0], across = args->view.perspective ? z : 1.0, depth = z + (double)args->eye_z;
     double p[3] = {ray.u * across, ray.v * across, -depth}, rays[3] = {ray.error_u * across, ray.error_v * across, 0.0};
+    if (recolor->source == PT_RAMP_TRUST) {
+        const double doubt = 15.0 - (((const uint32_t *)planes->colors)[id] >> PT_SHAPE_TRUST_SHIFT & 15u);
+        *t = (1.0 - doubt * doubt / 225.0 - recolor->zero) * slope;
+        *error = 4.0 * TOL_UNIT * (fabs(*t) + fabs(slope));
+        return 1;
+    }
     if (recolor->source == PT_RAMP_SCALAR) {
         double scalar = ((const float *)planes->colors)[id];
         *t = (scalar - recolor->zero) * slope;

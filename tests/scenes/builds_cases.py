@@ -158,6 +158,10 @@ def _colors(to: _List) -> None:
         "classes hidden": {"hidden_classes": [4] + [0] * 7},
     }.items():
         to.add(f"color {name}", {"of": "opaque attributes", **LIT, **style})
+    for cloud in ("analysed", "scan"):  # with a kind that hides points, and without
+        to.add(f"color trust, {cloud}", {"of": cloud, "color_source": "COLOR_SOURCE.TRUST", "ramp": RAMP, "least_trust": -1.0})
+    to.add("color trust, none known", {"of": "opaque attributes", "color_source": "COLOR_SOURCE.TRUST", "ramp": RAMP})
+    to.add("color trust, discs", {"of": "scan", "color_source": "COLOR_SOURCE.TRUST", "least_trust": -1.0}, settings={"surface": "SURFACE.SPLATS"})
     to.add("color grade", {**TORUS, "grade": [[1.5, 1.2, 0.5, 1.0], [0.7, 0.8, 1.5, -2.0]]})
     to.add("mask", {**TORUS, "mask": 1})
     to.add("mask, shadow, selected", {**TORUS, "mask": 1}, FLOOR, light={**SUN, "shadows": 1}, do="pick")

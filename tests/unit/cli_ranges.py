@@ -99,5 +99,5 @@ def test_range_images_are_not_analysed():
     bare, analysed = at(), at("--analysis", "on")
     assert not bare[1] and analysed[1] and bare[0] == analysed[0], (bare[1], analysed[1])
     assert at("--range-pixel", "3", "--range-gamma", "0.05")[0] == at("--range-pixel", "3", "--range-gamma", "0.05", "--analysis", "on")[0]
-    assert at("--hide-kinds", "stray")[1] and at("--pass", "trust")[1] and at("--soft", "base")[1] and not at("--cull")[1]
+    assert at("--hide-kinds", "line")[1] and at("--trust", "0.5")[1] and at("--ramp", "trust")[1] and at("--pass", "trust")[1] and at("--soft", "base")[1] and not at("--cull")[1]
     assert json.loads(cli.run("render", "round.ply", *cli.FRONT, "--stats", "json").stdout)["analysis_ms"], "other surfaces are"

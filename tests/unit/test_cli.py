@@ -164,7 +164,7 @@ def test_free_space():
     assert at("--hide-kinds", "surface,border") != off and at("--trust", "1") != off
     ball("alone.ply", 1000)
     assert "stations" in run("render", "alone.ply", *FRONT, "-o", "x.png", "--free-space", "use", code=1).stderr
-    for arguments in (["--free-space", "maybe"], ["--hide-kinds", "surface,cheese"], ["--hide-kinds", ""], ["--trust", "2"],
+    for arguments in (["--free-space", "maybe"], ["--hide-kinds", "surface,cheese"], ["--hide-kinds", "stray"], ["--hide-kinds", ""], ["--trust", "2"],
                       ["--free-space", "use", "--analysis", "off"]):
         run("render", "alone.ply", *FRONT, "-o", "x.png", *arguments, code=2)
 
@@ -828,7 +828,8 @@ def main():
     passed, failed = 0, 0
     import cli_files  # which ask this script for its helpers
     import cli_ranges
-    tests = [(name, test) for name, test in {**globals(), **vars(cli_files), **vars(cli_ranges)}.items() if name.startswith("test_")]
+    import cli_trust
+    tests = [(name, test) for name, test in {**globals(), **vars(cli_files), **vars(cli_ranges), **vars(cli_trust)}.items() if name.startswith("test_")]
     wanted = sys.argv[2:]
     with tempfile.TemporaryDirectory() as folder:
         FOLDER = Path(folder)

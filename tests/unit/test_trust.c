@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Trust: defined for degenerate clouds; planted strays lose it and vanish from pictures, and the surface beneath them is as if they were
-// not there; the same for any threads; files of older versions are analyzed again.
+// not there; where no point is trusted all are drawn; the same for any threads.
 #include "scene/analysis.h"
 #include "scene/trust.h"
 #include "scenes/clouds.h"
@@ -74,9 +74,10 @@ static void test_levels(void **state)
     assert_int_equal(pt_level_of_trust(2.0), 15);
 }
 
-// Pixels that show something from straight above.
+// Pixels that show something from straight above. left_out: NULL, or the points that are left out for their trust, and those of a cloud
+// of which none is trusted.
 static uint64_t shown_of(patina_device *device, const patina_cloud *cloud, float least, float depths[64 * 64],
-                         uint64_t *untrusted)
+                         uint64_t left_out[2])
 {
     static float rgba[64][64][4];
     patina_scene *scene = NULL;
@@ -103,8 +104,10 @@ static uint64_t shown_of(patina_device *device, const patina_cloud *cloud, float
     }
     patina_frame_stats stats = {.struct_size = sizeof stats};
     CHECK(patina_frame_get_stats(frame, &stats), frame);
-    if (untrusted)
-        *untrusted = stats.untrusted;
+    if (left_out) {
+        left_out[0] = stats.untrusted;
+        left_out[1] = stats.none_trusted;
+    }
     patina_frame_destroy(frame);
     patina_scene_destroy(scene);
     return shown;
@@ -175,7 +178,7 @@ static void test_strays_vanish(void **state)
     patina_cloud *with = cloud_of(p, PLANE + STRAYS), *without = cloud_of(p, PLANE);
     const patina_analysis_desc desc = {.struct_size = sizeof desc};
     float *trust = trusts_of(with, &desc), *clean = trusts_of(without, &desc), above[64 * 64], beneath[64 * 64];
-    uint64_t lost = 0, found = 0, wrong = 0, untrusted = 0;
+    uint64_t lost = 0, found = 0, wrong = 0, untrusted[2];
     patina_cloud_info info = {.struct_size = sizeof info};
     CHECK(patina_cloud_get_info(with, &info), with);
     assert_true(info.trust_default > (double)PATINA_TRUST_DEFAULT - 1e-6);
@@ -190,16 +193,17 @@ static void test_strays_vanish(void **state)
         patina_device *device = support_device_open(support_device_name(k), 0, 0);
         if (!device)
             continue;
-        shown_of(device, with, -1.0f, above, &untrusted);
-        assert_int_equal(untrusted, 0);
+        shown_of(device, with, -1.0f, above, untrusted);
+        assert_int_equal(untrusted[0], 0);
         float nearest = INFINITY, farthest = 0.0f;
         for (int i = 0; i < 64 * 64; i++) {
             nearest = fminf(nearest, above[i]);
             farthest = isfinite(above[i]) ? fmaxf(farthest, above[i]) : farthest;
         }
         assert_true(farthest - nearest > 0.08f); // strays show
-        assert_true(shown_of(device, with, 0.0f, beneath, &untrusted) > 1000);
-        assert_int_equal(untrusted, found + lost);
+        assert_true(shown_of(device, with, 0.0f, beneath, untrusted) > 1000);
+        assert_int_equal(untrusted[0], found + lost);
+        assert_int_equal(untrusted[1], 0);
         for (int i = 0; i < 64 * 64; i++)
             wrong += isfinite(beneath[i]) && farthest - beneath[i] > 0.08f;
         assert_true(wrong <= 64 * 64 * (STRAYS - found) / 100);
@@ -222,6 +226,34 @@ static void test_strays_vanish(void **state)
     free(p);
     patina_cloud_destroy(with);
     patina_cloud_destroy(without);
+}
+
+// Points at random: a threshold above all of them draws all, and the statistics say so.
+static void test_none_trusted(void **state)
+{
+    (void)state;
+    enum { FEW = 200 };
+    struct pcg random = pcg_seed(3);
+    double *p = places(FEW);
+    for (int i = 0; i < 3 * FEW; i++)
+        p[i] = pcg_between(&random, -1.0, 1.0);
+    patina_device *device = support_device_open("cpu", 0, 0);
+    patina_cloud *cloud = cloud_of(p, FEW);
+    const patina_analysis_desc desc = {.struct_size = sizeof desc};
+    float *trust = trusts_of(cloud, &desc), most = 0.0f;
+    for (int i = 0; i < FEW; i++)
+        most = fmaxf(most, trust[i]);
+    const uint32_t level = pt_level_of_trust((double)most);
+    assert_true(level < PT_TRUST_LEVELS - 1);
+    uint64_t all[2], some[2], none[2];
+    const uint64_t shown = shown_of(device, cloud, -1.0f, NULL, all);
+    assert_true(shown_of(device, cloud, (float)pt_trust_of_level(level), NULL, some) > 0);
+    assert_int_equal(shown_of(device, cloud, (float)pt_trust_of_level(level + 1), NULL, none), shown);
+    assert_true(all[0] == 0 && all[1] == 0 && some[0] < FEW && some[1] == 0 && none[0] == 0 && none[1] == FEW);
+    patina_cloud_destroy(cloud);
+    patina_device_destroy(device);
+    free(trust);
+    free(p);
 }
 
 static void test_threads(void **state)
@@ -250,8 +282,8 @@ static void test_threads(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_levels),        cmocka_unit_test(test_degenerate), cmocka_unit_test(test_default_level),
-        cmocka_unit_test(test_strays_vanish), cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_levels),        cmocka_unit_test(test_degenerate),   cmocka_unit_test(test_default_level),
+        cmocka_unit_test(test_strays_vanish), cmocka_unit_test(test_none_trusted), cmocka_unit_test(test_threads),
     };
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -6,13 +6,20 @@
 #include "device_cpu/rows.h"
 #include "shared/colors.h"
 
+// Of words of shapes.
+static inline vf pt_trust_of_words(vi words)
+{
+    const vf doubt = vi_convert(vi_sub(vi_set(15u), vi_and(vi_shr(words, PT_SHAPE_TRUST_SHIFT), vi_set(15u))));
+    return (vf_set(225.0f) - doubt * doubt) * vf_set(PT_TRUST_STEP);
+}
+
 // Where the colours lie on the ramp. scalars: of the points, where they are its source.
 static inline vf pt_place_on_ramp(const struct shade_args *args, const vf towards[2], vf z, vf scalars)
 {
     const struct recolor_args *recolor = &args->recolor;
     const vf zero = vf_set(recolor->zero), slope = vf_set(recolor->along[0]);
     vf ray[2] = {towards[0], towards[1]};
-    if (recolor->source == PT_RAMP_SCALAR)
+    if (recolor->source == PT_RAMP_SCALAR || recolor->source == PT_RAMP_TRUST)
         return (scalars - zero) * slope;
     vf depth = z + vf_set(args->eye_z);
     if (recolor->source == PT_RAMP_DISTANCE) {
@@ -61,7 +68,8 @@ static inline void pt_recolor_at(const struct shade_args *args, const float *ram
 {
     const struct recolor_args *recolor = &args->recolor;
     if (recolor->source) {
-        vf scalars = color[0], t = pt_place_on_ramp(args, ray, z, scalars);
+        const vf scalars = recolor->source == PT_RAMP_TRUST ? pt_trust_of_words(vf_bits(color[0])) : color[0];
+        const vf t = pt_place_on_ramp(args, ray, z, scalars);
         pt_ramp(recolor, ramps, t, ours, color);
         vm number = vf_le(scalars, scalars);
         for (uint32_t k = 0; k < 3 && recolor->source == PT_RAMP_SCALAR; k++)

@@ -330,15 +330,17 @@ PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_inf
 enum patina_lighting { PATINA_LIGHTING_AUTO = 0, PATINA_LIGHTING_UNLIT = 1, PATINA_LIGHTING_LIT = 2 };
 // AUTO: clouds shown in colours of their own are unlit (these hold the light of the day of the scan), others lit.
 
-// Where the colour of points comes from. From SCALAR on: a ramp over the point's scalar, the world's z, the object's z, or
-// the distance to the camera (its plane, in orthographic views) of the surface that a pixel shows.
+// Where the colour of points comes from. From SCALAR on: a ramp over the point's scalar, the world's z, the object's z, the distance
+// to the camera (its plane, in orthographic views) of the surface that a pixel shows, or the point's trust. Points of a cloud that was
+// not analysed have no trust: they take style.color.
 enum patina_color_source {
     PATINA_COLOR_OWN = 0, // the point's; where the cloud has none, style.color
     PATINA_COLOR_FIXED = 1,
     PATINA_COLOR_SCALAR = 2,
     PATINA_COLOR_HEIGHT = 3,
     PATINA_COLOR_OBJECT_HEIGHT = 4,
-    PATINA_COLOR_DISTANCE = 5
+    PATINA_COLOR_DISTANCE = 5,
+    PATINA_COLOR_TRUST = 6
 };
 #define PATINA_MAX_RAMP 256
 // A ramp by name: grey, viridis, heat, spectrum, relief, diverging; classes: of LAS classes, for a range of 0 to 255.
@@ -390,7 +392,7 @@ typedef struct patina_cloud_style {
                                 // beyond. NULL = from black to white. A scalar that is NaN takes `color`
     uint32_t ramp_count;        // 2..PATINA_MAX_RAMP
     float ramp_range[2];        // values at its ends; equal = automatic: least and greatest value of the cloud's points,
-                                // for heights and distances of its chunks' boxes
+                                // for heights and distances of its chunks' boxes, for trust 0 and 1
     float exposure;             // stops, -32..32; on the colour, before light
     float contrast;             // 0..16: slope in stops around mid grey (0.18), after exposure; 0 = 1
     uint32_t hidden_classes[8]; // bits as in patina_cloud_info.class_bits: points that are not drawn and cast no shadow
@@ -399,7 +401,7 @@ typedef struct patina_cloud_style {
     uint32_t free_space;   // patina_free_space: what becomes of what a station saw through
     uint32_t hidden_kinds; // bits 1 << patina_kind: points that are not drawn and cast no shadow
     float least_trust;     // points of less trust are not drawn and cast no shadow; 0 = the cloud's own default, negative = all
-                           // are drawn. Where no point has as much, all are drawn, too, and the log says so
+                           // are drawn. Where no point has as much, all are drawn, too: patina_frame_stats.none_trusted
     float largest_gap;     // world units; no disc is wider, whatever its radius; 0 = as wide as it is
     const patina_mask
         *mask; // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
@@ -714,7 +716,8 @@ typedef struct patina_frame_stats {
     // Points of mapped files that cannot be read any more, cut short or on a disk that is gone: they are not drawn. The log names each
     // such file once.
     uint64_t points_lost;
-    uint64_t untrusted; // points of the scene that are left out for their trust: patina_cloud_style.least_trust
+    uint64_t untrusted;    // points of the scene that are left out for their trust: patina_cloud_style.least_trust
+    uint64_t none_trusted; // points of clouds in which no point has that much trust, so that all are drawn
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
