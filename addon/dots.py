@@ -28,10 +28,10 @@ def left_out(description: SceneDescription, own: Sequence[Clip], untrusted: bool
 
 
 def _leaves_out(style: CloudStyle, cut: bool, untrusted: bool) -> bool:
-    return bool(cut and not style.clip_off or any(style.hidden_classes) or style.hidden_kinds or untrusted and style.least_trust >= 0.0
+    return bool(cut and not style.clip_off or any(style.hidden_classes) or untrusted and style.least_trust >= 0.0
                 or style.free_space == SEEN_THROUGH)
 
 
 def _whole(style: CloudStyle) -> CloudStyle:
-    return replace(style, hidden_classes=(0,) * 8, hidden_kinds=0, least_trust=-1.0, free_space=0, clip_off=0, cull_back=0,
+    return replace(style, hidden_classes=(0,) * 8, least_trust=-1.0, free_space=0, clip_off=0, cull_back=0,
                    transparency=0.0, surface=0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from . import cryptomatte, graphics, native, passes, render, streaming, sync, viewport
 from .importers import told
-from .sync import losses, motion
+from .sync import losses, motion, trust
 from .sync.kept import CHECKS
 
 ROUNDS = 8  # of a picture whose lights want further points
@@ -158,6 +158,9 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
                 if item.cloud.stream and item.cloud.stream.message]
         losses.check(lost)
         told = [f"'{item.name}': {text}" for item in description.clouds if item.cloud.stream for text in item.cloud.stream.notes]
+        told += trust.notices(description.clouds)
+        for item in description.clouds:  # once told is enough
+            item.cloud.renewed = ""
         return replace(description, notices=[*description.notices, *told, *lost]), picture
 
     def _go_to(self, frame: float) -> None:
@@ -202,6 +205,8 @@ def _kept(least: int, most: int, asked: int) -> str:
 def _summary(picture: render.Picture, ms: float, kept: str) -> str:
     """The line above a final picture; kept: of one that was ended."""
     stats, parts = picture.stats, []
+    if stats["untrusted"]:
+        parts.append(f"{stats['untrusted']:,} left out for their trust")
     if stats["layers"] > 1:
         parts.append(f"{stats['layers']} layers")
     if kept:

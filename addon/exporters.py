@@ -73,6 +73,13 @@ class Points:
     stations: np.ndarray | None = None  # (scans, 3) float64, in these too; NaN: not known
 
 
+def only(points: Points, keep: np.ndarray) -> Points:
+    """keep: (n,) bool."""
+    normals, colors = (None if column is None else column[keep] for column in (points.normals, points.colors))
+    return replace(points, positions=points.positions[keep], normals=normals, colors=colors,
+                   scalars={name: values[keep] for name, values in points.scalars.items()})
+
+
 def _scan_lines(points: Points) -> list[str]:
     """For the header, as the library's reader has them: ply_scans.c."""
     lines = []

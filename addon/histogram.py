@@ -1,27 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Histograms of the numbers by which points are soft, with the threshold in them.
+"""Histograms of the numbers by which points are soft, and of their trust, with the threshold in them.
 
-Pictures tell which fields they were made with; the library counts a field's numbers as it makes it, so that a panel's histogram costs
-nothing, however many points there are. Blender has no widget for one: it is painted into an icon, by a timer and never while a
+Pictures tell which fields and clouds they were made with; the library counts a field's numbers and levels of trust as it makes them, so
+that a panel's histogram costs nothing, however many points there are. Blender has no widget for one: it is painted into an icon, by a timer and never while a
 panel draws, when the field or what the panel says of it has changed."""
 
 from __future__ import annotations
 
 import threading
 import weakref
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
 import bpy.utils.previews
 import numpy as np
 
+from . import native
 from .native.points import Field
+from .sync import trust
 from .sync.colors import class_bits
 from .sync.soft import Soft
 
 SIZE, WIDE = 256, 4  # pixels a side; of a bar, which is of as many bins: one of painted points, all at 0 or 1, is to be seen
-_PAPER, _HARD, _SOFT, _LEADS, _LINE = ((*color, 1.0) for color in (
-    (0.11, 0.11, 0.11), (0.55, 0.55, 0.55), (0.33, 0.62, 0.95), (0.16, 0.20, 0.26), (1.0, 0.72, 0.25)))
+_PAPER, _HARD, _SOFT, _LEADS, _LINE, _LEFT_OUT = ((*color, 1.0) for color in (
+    (0.11, 0.11, 0.11), (0.55, 0.55, 0.55), (0.33, 0.62, 0.95), (0.16, 0.20, 0.26), (1.0, 0.72, 0.25), (0.85, 0.36, 0.30)))
 
 
 @dataclass(frozen=True)
@@ -44,11 +47,22 @@ class Known:
         return self.range[0] + value * (self.range[1] - self.range[0])
 
 
-Key = tuple[int, float, float]  # stamp, threshold, transition
+@dataclass(frozen=True)
+class Trusts:
+    """Of the trust of the points that an object was drawn with last."""
+
+    cloud: weakref.ref[native.Cloud]
+    counts: np.ndarray  # (16,) points of each level
+    stamp: int
+
+
+Key = tuple[float, ...]  # what a picture is of
+Paint = Callable[[], np.ndarray]
 
 _known: dict[str, Known] = {}  # by the objects' names
+_trusts: dict[str, Trusts] = {}  # likewise
 _asked: set[str] = set()  # whose histograms panels have shown, or would have
-_wanted: dict[str, Key] = {}
+_wanted: dict[str, tuple[Key, Paint]] = {}  # by the pictures' titles
 _painted: dict[str, Key] = {}
 _previews: bpy.utils.previews.ImagePreviewCollection | None = None
 _stamps = 0
@@ -82,12 +96,72 @@ def of(obj: bpy.types.Object) -> Known | None:
 def icon(obj: bpy.types.Object, known: Known) -> int:
     """Blender's number of the last picture of it; 0: none yet. A newer one is on its way where one is needed."""
     group = obj.patina.soft
-    key = (known.stamp, group.threshold, group.transition)
-    if _painted.get(obj.name) != key:
-        _wanted[obj.name] = key
+    threshold, transition = group.threshold, group.transition
+    return _icon(_title(obj.name), (known.stamp, threshold, transition), lambda: picture(known.counts, threshold, transition))
+
+
+def _icon(title: str, key: Key, make: Paint) -> int:
+    if _painted.get(title) != key:
+        _wanted[title] = (key, make)
         _wake()
-    found = _previews.get(_title(obj.name)) if _previews and obj.name in _painted else None
+    found = _previews.get(title) if _previews and title in _painted else None
     return found.icon_id if found else 0
+
+
+# ---- trust -------------------------------------------------------------------------------------------------------------
+
+
+def note_trust(name: str, cloud: native.Cloud) -> None:
+    """A picture draws an object's points with this cloud."""
+    global _stamps
+    known = _trusts.get(name)
+    if not cloud.has_shapes:
+        _trusts.pop(name, None)
+    elif known is None or known.cloud() is not cloud or tuple(known.counts) != cloud.trusts:
+        _stamps += 1
+        _trusts[name] = Trusts(weakref.ref(cloud), np.array(cloud.trusts, np.int64), _stamps)
+        if name in _asked and threading.current_thread() is threading.main_thread():
+            _wake()
+
+
+def trust_of(obj: bpy.types.Object) -> Trusts | None:
+    """None where no picture has shown the object's points analyzed."""
+    _asked.add(obj.name)
+    found = _trusts.get(obj.name)
+    return found if found and found.cloud() else None
+
+
+def automatic_trust(name: str) -> float:
+    """The threshold that Patina chooses for an object, as far as a picture has told it."""
+    found = _trusts.get(name)
+    cloud = found.cloud() if found else None
+    return cloud.trust_default if cloud else trust.DEFAULT
+
+
+def trust_icon(obj: bpy.types.Object, known: Trusts, level: int) -> int:
+    """As icon(). level: the first that is drawn."""
+    return _icon(_trust_title(obj.name), (known.stamp, level), lambda: trust_picture(known.counts, level))
+
+
+def trust_picture(counts: np.ndarray, level: int) -> np.ndarray:
+    """As picture(): a bar for each level of trust, the lowest left. Points of levels before the line are left out."""
+    wide = SIZE // trust.LEVELS
+    heights = np.sqrt(counts / max(counts.max(), 1)) * (SIZE - 8)
+    heights = np.where(counts > 0, np.maximum(heights, 2.0), 0.0).repeat(wide)
+    column = np.arange(SIZE)
+    pixels = np.empty((SIZE, SIZE, 4), np.float32)
+    pixels[:] = _PAPER
+    bars = (np.arange(SIZE)[:, None] < heights[None, :]) & (column % wide < wide - 1)[None, :]
+    pixels[:] = np.where(bars[..., None], np.where((column >= level * wide)[None, :, None], _SOFT, _LEFT_OUT), pixels)
+    pixels[:, max(level * wide - 1, 0):level * wide + 1] = _LINE
+    return pixels
+
+
+def _trust_title(name: str) -> str:
+    return f"trust {name}"
+
+
+# ---- pictures ----------------------------------------------------------------------------------------------------------
 
 
 def picture(counts: np.ndarray, threshold: float, transition: float) -> np.ndarray:
@@ -109,28 +183,26 @@ def picture(counts: np.ndarray, threshold: float, transition: float) -> np.ndarr
 def paint() -> bool:
     """Paints what panels have asked for. Whether there was something."""
     global _previews
-    names = [name for name in _wanted if name in _known]
-    for name in names:
-        stamp, threshold, transition = _wanted[name]
+    wanted = dict(_wanted)
+    _wanted.clear()
+    for title, (key, make) in wanted.items():
         if _previews is None:
             _previews = bpy.utils.previews.new()
-        title = _title(name)
         found = _previews.get(title) or _previews.new(title)
         found.image_size = (SIZE, SIZE)
-        found.image_pixels_float.foreach_set(picture(_known[name].counts, threshold, transition).reshape(-1))
-        _painted[name] = (_known[name].stamp, threshold, transition)
-    _wanted.clear()
-    return bool(names)
+        found.image_pixels_float.foreach_set(make().reshape(-1))
+        _painted[title] = key
+    return bool(wanted)
 
 
 def _title(name: str) -> str:
     return f"soft {name}"
 
 
-def pixels(obj: bpy.types.Object) -> np.ndarray:
-    """What the icon shows, as picture() gives it."""
+def pixels(obj: bpy.types.Object, title: Callable[[str], str] = _title) -> np.ndarray:
+    """What the icon shows, as picture() gives it; of trust with _trust_title."""
     found = np.empty(SIZE * SIZE * 4, np.float32)
-    _previews[_title(obj.name)].image_pixels_float.foreach_get(found)
+    _previews[title(obj.name)].image_pixels_float.foreach_get(found)
     return found.reshape(SIZE, SIZE, 4)
 
 
@@ -150,7 +222,7 @@ def _wake() -> None:
 
 def forget() -> None:
     global _previews
-    for kept in (_known, _asked, _wanted, _painted):
+    for kept in (_known, _trusts, _asked, _wanted, _painted):
         kept.clear()
     if _previews is not None:
         bpy.utils.previews.remove(_previews)

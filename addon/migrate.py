@@ -8,6 +8,8 @@ A step is done once for each scene that Patina draws, and finds it as the step b
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.app.handlers import persistent
 
@@ -18,7 +20,26 @@ def _meshes_were_left_out(scene: bpy.types.Scene) -> None:
         scene.patina.meshes = 'OFF'
 
 
-STEPS = (_meshes_were_left_out,)
+def _strays_were_hidden(scene: bpy.types.Scene) -> None:
+    """Until version 2 stray points had a switch of their own, and points of little certainty a threshold. Both are left out for their
+    trust now, unless the object draws all points."""
+    for obj in scene.objects:
+        if obj.library is not None:
+            continue
+        stored = _stored(obj)
+        if stored.get("hide_stray") and obj.patina.least_trust == 0.0:
+            obj.patina.property_unset("least_trust")
+        for name in ("hide_stray", "least_certainty"):
+            if name in stored:
+                del stored[name]
+
+
+def _stored(obj: bpy.types.Object) -> Any:
+    """What is saved of an object's properties, by name, those that are no longer known too; like a dict."""
+    return obj.patina if bpy.app.version < (5, 0, 0) else obj.patina.bl_system_properties_get() or {}
+
+
+STEPS = (_meshes_were_left_out, _strays_were_hidden)
 
 
 def bring(scene: bpy.types.Scene) -> None:

@@ -419,6 +419,7 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
         parted = soft.field_of(item.cloud, softened) if softened else None
         if softened:
             histogram.note(item.name, softened, parted)
+        histogram.note_trust(item.name, item.cloud)
         scene.add_cloud(item.cloud, mask=edits.mask_of(item.cloud, item.edits), grade=edits.grade_of(item.cloud, item.edits),
                         field=parted,
                         scans=ranges.scans_of(item.cloud, item.told, as_ranges in (style.surface, description.settings.surface)),

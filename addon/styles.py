@@ -18,8 +18,8 @@
     }
 
 Keys of "scene" are properties of Scene.patina, of "points" those of Object.patina, by their path in Python; those that
-make up a look are listed below, and one that a file leaves out takes its default; those of soft points only where the file
-has one of them, or the style before it had: what an artist has painted or chosen there stays. Angles are in degrees; colours linear
+make up a look are listed below, and one that a file leaves out takes its default; those of soft points and of trust only
+where the file has one of them, or the style before it had: what an artist has painted or chosen there stays. Angles are in degrees; colours linear
 red, green, blue, or "#rrggbb" in sRGB. "view" is left as it is where the file has none. Lights, cameras and worlds are
 never touched, nor is a property that is animated or driven. A picture of the same name, .png, is the file's thumbnail.
 """
@@ -51,6 +51,9 @@ POINTS = ("lighting", "opacity", "color", "ambient", "diffuse", "specular", "shi
           "colors.exposure", "colors.contrast")
 SOFT = tuple(f"soft.{name}" for name in ("use", "by", "attribute", "classes", "shape", "use_range", "range_min", "range_max", "invert",
                                          "threshold", "transition", "opacity"))
+TRUST = ("least_trust",)
+# What a style sets only if its file has one of it, or if the style before it had. That is noted in the property named behind it.
+OPTIONAL = ((SOFT, "soft.styled"), (TRUST, "trust_styled"))
 
 
 class StyleError(Exception):
@@ -224,7 +227,7 @@ def _properties(group: bpy.types.Struct, names: Iterable[str]) -> Iterator[tuple
 
 def _known(section: str) -> dict[str, bpy.types.Property]:
     """What keys of a file's section stand for."""
-    owners = {"scene": (bpy.types.Scene, SCENE), "points": (bpy.types.Object, POINTS + SOFT)}
+    owners = {"scene": (bpy.types.Scene, SCENE), "points": (bpy.types.Object, POINTS + SOFT + TRUST)}
     if section not in owners:
         return {}
     kind, names = owners[section]
@@ -335,9 +338,13 @@ def dress(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
 
 
 def _set_points(obj: bpy.types.Object, style: Style, kept: list[str]) -> None:
-    softens = any(path in SOFT for path in style.points)
-    _set(obj, POINTS + SOFT if softens or obj.patina.soft.styled else POINTS, style.points, kept)
-    obj.patina.soft.styled = softens
+    names = POINTS
+    for group, noted in OPTIONAL:
+        says = any(path in group for path in style.points)
+        owner, name = _owner(obj.patina, noted)
+        names += group if says or getattr(owner, name) else ()
+        setattr(owner, name, says)
+    _set(obj, names, style.points, kept)
 
 
 def _set(owner: bpy.types.ID, names: Iterable[str], values: dict[str, Any], kept: list[str]) -> None:
@@ -377,7 +384,9 @@ def _curves(action: bpy.types.Action, slot: Any) -> list[bpy.types.FCurve]:
 
 def taken(label: str, scene: bpy.types.Scene, obj: bpy.types.Object | None) -> Style:
     """The look of a scene and of an object with points, as a style: what differs from the defaults."""
-    names = POINTS + SOFT if obj and obj.patina.soft.use else POINTS
+    names = POINTS
+    if obj:
+        names += (SOFT if obj.patina.soft.use else ()) + (TRUST if obj.patina.colors.source == 'TRUST' else ())
     return Style(label, scene=_differing(scene.patina, SCENE), points=_differing(obj.patina, names) if obj else {},
                  transform=scene.view_settings.view_transform)
 

@@ -14,11 +14,13 @@ import numpy as np
 from mathutils import Matrix
 
 from . import native, render, sample, sync
+from .sync.colors import TRUST
 from .sync.soft import soft_of
 
 SIZE = 192  # pixels a side
 SHRINK = 2  # drawn larger by this: lines are as fine as in a large picture
 SAMPLE_POINTS = 300_000
+STRAYS = 250  # that the sample has where a look shows trust
 
 
 def of_scene(depsgraph: bpy.types.Depsgraph) -> np.ndarray:
@@ -43,8 +45,20 @@ def of_sample(depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object) -> np.ndarr
     softened = soft_of(look, Matrix(), depsgraph.scene_eval)
     if softened and softened.by == 'DISTANCE':  # from where the sample is seen
         softened = replace(softened, desc=(*softened.desc, ("world_from_shape", view.camera.world_from_camera)), placed=True)
-    cloud = native.Cloud(*sample.points(SAMPLE_POINTS), classes=sample.classes(SAMPLE_POINTS).reshape(-1, 1))
+    doubted = style.color_source == TRUST
+    cloud = native.Cloud(*(_with_strays if doubted else tuple)(sample.points(SAMPLE_POINTS)),
+                         classes=None if doubted else sample.classes(SAMPLE_POINTS).reshape(-1, 1))
+    if doubted:
+        cloud.analyse()
     return _draw(sync.describe_items(depsgraph, view, [], [sync.CloudItem(cloud, style, 0, soft=softened)]))
+
+
+def _with_strays(columns: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    """The sample with points in the air around it, so that a look at trust has some to show."""
+    random = np.random.default_rng(STRAYS)
+    some = random.integers(0, len(columns[0]), STRAYS)
+    positions = random.uniform((-1.1, -1.1, 0.0), (1.1, 1.1, 1.1 * sample.HEIGHT), (STRAYS, 3)).astype(np.float32)
+    return (np.concatenate([columns[0], positions]), *(np.concatenate([column, column[some]]) for column in columns[1:]))
 
 
 def _camera(azimuth: float = radians(28), height: float = radians(16), away: float = 4.6) -> sync.Camera:

@@ -25,7 +25,7 @@ from mathutils import Color
 from . import backdrop, cryptomatte, dots, graphics, mattes, native, overlays, pace, painting, render, sky, streaming, sync
 from .jobs import Pause, Steps
 from .native.points import highlight
-from .sync import analysis, edits
+from .sync import analysis, edits, trust
 from .sync.analyzing import ANALYSES
 from .sync.clouds import CACHE
 from .sync.kept import CHECKS
@@ -470,6 +470,8 @@ class Viewport:
                         said = edits.notice(item.name, item.edits, cloud)
                         if said and said not in self.notices:
                             self.notices = [*self.notices, said]
+                        told = [text for text in trust.notices(clouds[-1:]) if text not in self.notices]
+                        self.notices = [*self.notices, *told]
                     if item.cloud.lost and item.cloud.lost not in self.notices:
                         self.notices = [*self.notices, item.cloud.lost]
             finally:

@@ -203,6 +203,7 @@ class Cloud(_Handle):
     numbers_stamp = 0  # counts how often they changed
     scan_name: str = ""
     scan_numbers: tuple[int, ...] = ()
+    renewed = ""  # what to tell of a saved cloud whose points were analyzed again
     losses: int | None = None  # of a mapped file: losses() as it was opened
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
@@ -296,6 +297,8 @@ class Cloud(_Handle):
         self.has_shapes = bool(info.has_shapes)  # analysed
         self.normals_oriented = bool(info.normals_oriented)
         self.kinds = tuple(info.kinds)  # points of each of KINDS
+        self.trusts = tuple(info.trusts)  # drawn points of each level of trust; see sync/trust.py
+        self.trust_default = info.trust_default  # least trust of points that are drawn by default
         self.seen_through = info.seen_through  # points that a station saw through
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))

@@ -28,12 +28,14 @@ from . import (
     soft_brush,
     stations,
     styles,
+    untrusted,
     view_transform,
     world,
 )
 
 _MODULES = (add_light, analyze, balance, clips, colors, import_points, addresses, export_points, combine, convert_points, farm, linked_points, plan,
-            points, points_keys, points_tools, preferences, scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
+            points, points_keys, points_tools, preferences, scanner, scans, set_up, shadows, soft_brush, stations, styles, untrusted,
+            view_transform, world)
 
 
 def register() -> None:

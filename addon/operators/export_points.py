@@ -16,7 +16,8 @@ from bpy_extras.io_utils import ExportHelper
 
 from .. import exporters, importers, jobs, native, point_data
 from ..importers import origin, scans
-from ..sync import analysis, attributes, edits, linked
+from ..sync import analysis, attributes, edits, linked, trust
+from ..sync.analyzing import ANALYSES
 
 
 class PATINA_OT_export_points(Operator, ExportHelper):
@@ -33,6 +34,9 @@ class PATINA_OT_export_points(Operator, ExportHelper):
                ('LAZ', "LAZ", "LAS 1.2, compressed. Needs the packages laspy and lazrs", 2),
                ('E57', "E57", "One scan in the file per scan, with colors and intensity. Needs the package pye57", 3)))
     selected: BoolProperty(name="Selected Only", default=True, description="Export only the selected objects")
+    trusted: BoolProperty(name="Trusted Only", default=False,
+                          description="Leave out the untrusted points, as Trust does. At 0, leave out those that the automatic threshold would. "
+                                      "Points without an analysis are analyzed first")
     overwrite: BoolProperty(name="Overwrite", default=False, options={'HIDDEN', 'SKIP_SAVE'},
                             description="Replace an existing file of the same name. The file dialog asks first")
     filter_glob: StringProperty(default=";".join(f"*.{name}" for name in exporters.NEEDS), options={'HIDDEN'})
@@ -64,10 +68,12 @@ class PATINA_OT_export_points(Operator, ExportHelper):
             self.report({'ERROR'}, f"Patina: {error}")
             return {'CANCELLED'}
         objects, solid = self._objects(context)
-        parts = []
+        parts, untrusted = [], 0
         try:
             for obj in objects:
-                parts.append(_of_object(obj, context.scene))
+                keep = self._trusted(obj, context.scene) if self.trusted else None
+                untrusted += 0 if keep is None else int((~keep).sum())
+                parts.append(_of_object(obj, context.scene, keep))
         except native.PatinaError as error:
             self.report({'ERROR'}, importers.told(f"Patina: {error}"))
             return {'CANCELLED'}
@@ -86,9 +92,20 @@ class PATINA_OT_export_points(Operator, ExportHelper):
             return {'CANCELLED'}
         if left:
             self.report({'WARNING'}, f"{path.suffix[1:].upper()} has no place for {', '.join(left)}")
-        faces = f". Left out: {solid} mesh{'es' * (solid > 1)} with faces" if solid else ""
-        self.report({'INFO'}, f"Exported {len(points.positions):,} points to {path.name}{faces}")
+        out = [f"{untrusted:,} untrusted points"] * self.trusted + [f"{solid} mesh{'es' * (solid > 1)} with faces"] * bool(solid)
+        self.report({'INFO'}, f"Exported {len(points.positions):,} points to {path.name}{'. Left out: ' * bool(out)}{', '.join(out)}")
         return {'FINISHED'}
+
+    def _trusted(self, obj: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
+        """(n,) bool, of all points of an evaluated object, or of its file. PatinaError where the trust is not known."""
+        try:
+            cloud, least = trust.analyzed_cloud(obj, scene), trust.least_of(obj.patina)
+        except native.PatinaError as error:
+            raise native.PatinaError(f"'{obj.name}': {error}", error.code) from None
+        if trust.none_is_trusted(cloud, least):
+            self.report({'WARNING'}, f"Patina: '{obj.name}': no point is trusted, so all of them are exported")
+        with ANALYSES.drawing():
+            return ~trust.untrusted(cloud, least)
 
     def _path(self) -> Path:
         """The file to write. ExportError if name and format disagree, or if the file exists and must stay."""
@@ -158,15 +175,18 @@ def _bytes(colors: np.ndarray | None) -> np.ndarray | None:
     return np.rint(np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055) * 255).astype(np.uint8)
 
 
-def _of_object(obj: bpy.types.Object, scene: bpy.types.Scene) -> exporters.Points | None:
+def _of_object(obj: bpy.types.Object, scene: bpy.types.Scene, keep: np.ndarray | None = None) -> exporters.Points | None:
+    """keep: (n,) bool, of all points that the object or its file has; None: all."""
     if obj.patina.linked_file:
-        return _of_linked(obj, scene)
+        return _of_linked(obj, scene, keep)
     with attributes.readable(obj) as data:
-        return _read(obj, data, scene)
+        found = _read(obj, data, scene)
+    return found if found is None or keep is None else exporters.only(found, keep)
 
 
-def read_linked(obj: bpy.types.Object, frame: int, notices: list[str]) -> importers.PointFile | None:
-    """The file that an object links, without the points that were deleted. None, with a notice, where it is missing."""
+def read_linked(obj: bpy.types.Object, frame: int, notices: list[str], keep: np.ndarray | None = None) -> importers.PointFile | None:
+    """The file that an object links, without the points that were deleted, and those that keep leaves out. None, with a notice, where it
+    is missing."""
     source = linked.source_of(obj, frame, notices)
     if source is None:
         return None
@@ -176,13 +196,16 @@ def read_linked(obj: bpy.types.Object, frame: int, notices: list[str]) -> import
         edited = edits.for_cloud(edits.packed_of(obj), len(points.positions))
     except edits.Damaged as damaged:
         notices.append(f"'{obj.name}': {damaged}")
-        return points
-    return points.only(~edits.flags(edited.deleted, edited.count)) if edited and edited.totals["deleted"] else points
+        edited = None
+    if edited and edited.totals["deleted"]:
+        left = ~edits.flags(edited.deleted, edited.count)
+        keep = left if keep is None else left & keep
+    return points if keep is None else points.only(keep)
 
 
-def _of_linked(obj: bpy.types.Object, scene: bpy.types.Scene) -> exporters.Points:
+def _of_linked(obj: bpy.types.Object, scene: bpy.types.Scene, keep: np.ndarray | None) -> exporters.Points:
     notices: list[str] = []
-    points = read_linked(obj, scene.frame_current, notices)
+    points = read_linked(obj, scene.frame_current, notices, keep)
     if points is None:
         raise native.PatinaError(notices[0] if notices else f"'{obj.name}': the file is missing")
     own = np.array(obj.original.get(origin.PROPERTY, points.origin), np.float64)

@@ -11,7 +11,6 @@ from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume, 
 
 from .. import styles
 from ..native import MOST_LAYERS
-from ..native.abi import TRUST_DEFAULT
 from .automatic import switch
 from .brush import PatinaBrushProperties
 from .clips import PatinaClipProperties
@@ -192,6 +191,12 @@ def _known_distance(group: PropertyGroup) -> float:
     return estimates.layer_distance(group.id_data.name_full) or 0.01
 
 
+def _known_trust(group: PropertyGroup) -> float:
+    """The threshold that the last picture took for the object, to begin with."""
+    from .. import histogram  # which needs these properties
+    return histogram.automatic_trust(group.id_data.name)
+
+
 def _known_gap(group: PropertyGroup) -> float:
     return 2.0 * _known_distance(group)
 
@@ -261,9 +266,6 @@ class PatinaObjectProperties(PropertyGroup):
             ('OFF', "Off", "Draw them like other points", 0),
             ('SHOW', "Show", "Draw them in magenta, if the points have their own colors", 1),
             ('USE', "Hide", "Hide them, and open filled surface that a scanner looked through. Takes twice as long", 2)))
-    hide_stray: BoolProperty(
-        name="Stray", override=_OVERRIDE, default=False,
-        description="Hide points that are far from any surface. They cast no shadow")
     hide_uncolored: BoolProperty(
         name="Uncolored", override=_OVERRIDE, default=False,
         description="Hide points that are black or have no color, unless the whole cloud is black")
@@ -271,9 +273,12 @@ class PatinaObjectProperties(PropertyGroup):
         name="Unclassified", override=_OVERRIDE, default=False,
         description="Hide points of the classes 0 (never classified) and 1 (unassigned). They cast no shadow")
     least_trust: FloatProperty(
-        name="Trust", override=_OVERRIDE, default=TRUST_DEFAULT, min=0.0, max=1.0, subtype='FACTOR',
+        name="Trust", override=_OVERRIDE, default=-1.0, min=-1.0, soft_min=0.0, max=1.0, subtype='FACTOR',
         description="Hide points below this trust. They cast no shadow. Trust is the probability that a point is on a surface, not a mixed pixel or "
-                    "a stray. At the default, Patina raises the limit per cloud, up to 0.84. At zero, all points are drawn")
+                    "a stray. At 0, all points are drawn. Below 0, the threshold is automatic")
+    use_least_trust: switch("least_trust", _known_trust, "Set the threshold. Otherwise, Patina chooses it per cloud, from 0.64 to 0.84",
+                            "Set Trust", automatic=-1)
+    trust_styled: BoolProperty(override=_OVERRIDE, default=False, options={'HIDDEN'})  # by a style: the next one undoes it
     opacity: FloatProperty(
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
         description="Opacity of the surface")

@@ -32,7 +32,8 @@ class PatinaColorProperties(PropertyGroup):
             ('SCALAR', "Attribute", "Color ramp over a point attribute, such as intensity, class or scan number", 2),
             ('HEIGHT', "Height", "Color ramp over the world's Z axis", 3),
             ('OBJECT_HEIGHT', "Local Height", "Color ramp over the object's Z axis", 4),
-            ('DISTANCE', "Distance", "Color ramp over the distance from the camera", 5)))
+            ('DISTANCE', "Distance", "Color ramp over the distance from the camera", 5),
+            ('TRUST', "Trust", "Color ramp over the trust of each point. Points without an analysis have the fallback color", 6)))
     scalar: StringProperty(
         name="Attribute", override=_OVERRIDE, description="Point attribute that the color ramp shows")
     contour: StringProperty(

@@ -11,7 +11,6 @@ import numpy as np
 
 from .. import native, styles
 from ..importers import scans
-from ..native.abi import TRUST_DEFAULT
 from . import attributes, files, sequence
 
 SCANNERS = "patina_scanners"  # of the data: x, y, z of each, as the points' own coordinates
@@ -51,9 +50,9 @@ def wanted(obj: bpy.types.Object) -> int:
 
 def least_trust(patina: bpy.types.PropertyGroup) -> float:
     """As the library takes it: 0 is its default, and what is below 0 draws all points."""
-    if patina.least_trust <= 0.0:
-        return -1.0
-    return 0.0 if abs(patina.least_trust - TRUST_DEFAULT) < 1e-6 else patina.least_trust
+    if patina.least_trust < 0.0:
+        return 0.0
+    return patina.least_trust if patina.least_trust > 0.0 else -1.0
 
 
 def stations(obj: bpy.types.Object, data: bpy.types.ID, count: int, by_grid: bool) -> Stations | None:

@@ -81,7 +81,6 @@ class CloudStyle:
     radius: float = 0.0
     largest_gap: float = 0.0
     free_space: int = 0
-    hidden_kinds: int = 0
     least_trust: float = 0.0
     exact: int = 1  # black is black
     surface: int = 0  # as the settings; else PATINA_SURFACE_RANGES
@@ -471,6 +470,17 @@ class _Soon(Pending):
         self._arrays = None
 
 
+def of_object(obj: bpy.types.Object, surface: str, link: linked.Source | None, poll: Callable[[str, float], bool],
+              notices: list[str]) -> native.Cloud | None:
+    """The cloud of an object's own points, not evaluated, or of its linked file: the one that pictures have, or a new one. Analyzed where
+    the object's pictures are."""
+    identity = link.identity() if link else _identity(obj, set(), radius_name(obj, surface), 0)
+    taking = TakingNow(poll, notices)
+    found = taking(obj, identity, link, True)
+    taking.settle()
+    return found.built if isinstance(found, Pending) else found
+
+
 def _finished(identity: tuple, arrays: PointArrays, progress: Progress) -> native.Cloud:
     """The cloud of these points, analyzed where that is wanted."""
     with progress.inner() as inner:
@@ -651,7 +661,6 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         radius=patina.radius,
         largest_gap=patina.largest_gap,
         free_space=enum_number(patina, "free_space"),
-        hidden_kinds=int(patina.hide_stray) << native.KINDS.index("STRAY"),
         least_trust=analysis.least_trust(patina),
         **ranges.style_fields(obj), **colors.style_fields(obj))
 

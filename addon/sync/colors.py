@@ -16,6 +16,7 @@ from ..properties.colors import CLASSES
 OWN = 0  # PATINA_COLOR_OWN
 FIXED = 1  # PATINA_COLOR_FIXED
 SCALAR = 2  # PATINA_COLOR_SCALAR
+TRUST = 6  # PATINA_COLOR_TRUST
 UNCLASSIFIED = 1 << 0 | 1 << 1  # bits of the classes: never classified, unassigned
 
 

@@ -32,6 +32,7 @@ from .soft import attribute_name
 
 Corner = tuple[float, float, float]
 
+OLD = "saved by an older version"  # says the library's log of a saved cloud whose analysis knows no trust
 DETAIL = 1e-3  # of a saved cloud, in its units, half of which an origin keeps
 
 
@@ -182,10 +183,25 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     if source.streamed:
         return (yield from _stream(source, progress))
     if source.is_saved:
-        return _saved(source)
+        return (yield from _saved(source, progress))
     found = _opened(source)
-    if found:
+    if found and not _is_outdated(found.cloud, source):
         return found
+    if found:
+        found.cloud.close()
+    made = yield from _make(source, progress)
+    if found:
+        made.cloud.renewed = "its cache was of an older version of Patina, so the file was read and analyzed again"
+    return made
+
+
+def _is_outdated(cloud: native.Cloud, source: Source) -> bool:
+    """Whether a kept cloud was analyzed by an older version: the library opens it without that analysis."""
+    return bool(source.analyzed and cloud.drawn and not cloud.has_shapes)
+
+
+def _make(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
+    """Builds, analyzes and keeps the cloud of a file."""
     pieces = yield from importers.in_pieces(source.path, building.LARGE, building.names_of(source.scalar), progress)
     if pieces:
         try:
@@ -237,8 +253,28 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     return _linked(cloud, origin, scanners, units, scans and asdict(scans), told, source.kept)
 
 
-def _saved(source: Source) -> Linked:
-    """A saved cloud that the artist names: it is what it is, and nothing of it is made anew."""
+def _saved(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
+    """A saved cloud that the artist names: it is what it is, and nothing of it is made anew, but for an analysis of an older version."""
+    found = _open_saved(source)
+    cloud = found.cloud
+    if not cloud.has_shapes and any(OLD in text and source.path.name in text for _, text in native.log_lines()):
+        progress.doing = analysis.label(cloud)
+        try:
+            with progress.inner() as inner:
+                task = analyzing.start(cloud, None, inner)
+            yield task
+            task.result()
+            cloud.renewed = (f"{source.path.name} was saved by an older version of Patina, so its points were analyzed again. To keep that, "
+                             f"run: patina analyse {source.path.name} -o NEW.cloud")
+        except native.PatinaCancelled:
+            raise
+        except native.PatinaError as error:
+            cloud.renewed = (f"{source.path.name} was saved by an older version of Patina, and its points cannot be analyzed here ({error}). "
+                             f"Run: patina analyse {source.path.name} -o NEW.cloud")
+    return found
+
+
+def _open_saved(source: Source) -> Linked:
     origin = source.origin or ZERO
     cloud = native.Cloud.open(source.path, [-value for value in origin])
     if source.origin is None or math.dist(np.clip(ZERO, *cloud.box), ZERO) > TOGETHER:  # one of elsewhere, which came in its place

@@ -32,7 +32,7 @@ def spare_analysis(obj: bpy.types.Object, surface: str, layer: bpy.types.ViewLay
     """Whether an object is drawn as range images, and nothing else asks for what an analysis finds: it may have one, and its picture is
     the same. surface: of the scene."""
     patina = obj.patina
-    asked = (patina.analysis == 'ALWAYS' or patina.soft.use or patina.cull_back or patina.hide_stray
+    asked = (patina.analysis == 'ALWAYS' or patina.soft.use or patina.cull_back or patina.colors.source == 'TRUST'
              or analysis.least_trust(patina) > 0.0 or patina.free_space != 'OFF')
     return ((patina.ranges.use or surface == 'RANGES') and not asked
             and not (layer.patina.use_pass_trust or layer.patina.use_pass_thickness))

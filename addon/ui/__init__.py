@@ -23,11 +23,12 @@ from . import (
     standard,
     statistics,
     styles,
+    trust,
     world,
 )
 
 # What makes the look comes first, then how it is drawn.
-_MODULES = (presets, styles, lines, effects, panels, sampling, cryptomatte, points, colors, soft, ranges, scan_points, motion, combine, panorama,
+_MODULES = (presets, styles, lines, effects, panels, sampling, cryptomatte, points, trust, colors, soft, ranges, scan_points, motion, combine, panorama,
             sequence, materials, world, statistics, standard)
 
 

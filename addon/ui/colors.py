@@ -64,7 +64,7 @@ class PATINA_PT_color(ColorPanel, Panel):
         column = layout.column(align=True)
         row = column.row(align=True)
         row.prop(group, "use_range")
-        if group.source != 'DISTANCE':
+        if group.source not in {'DISTANCE', 'TRUST'}:
             row.operator("object.patina_robust_range", text="Robust")
         if group.use_range:
             column.prop(group, "range_min")

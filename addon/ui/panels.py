@@ -253,14 +253,10 @@ class PATINA_PT_hidden(_PatinaObjectPanel, Panel):
         layout.use_property_split = True
         patina = context.object.patina
         column = layout.column(heading="Hide")
-        row = column.row()
-        row.active = patina.analysis != 'OFF'
-        row.prop(patina, "hide_stray")
         column.prop(patina, "hide_uncolored")
         column.prop(patina, "hide_unclassified")
         column = layout.column()
         column.active = patina.analysis != 'OFF'
-        column.prop(patina, "least_trust")
         column.prop(patina, "free_space")
 
 

@@ -10,7 +10,7 @@ from bpy.types import Context, Panel
 from .. import point_data
 from ..operators import add_light, convert_points
 from ..operators.clips import PATINA_OT_add_clip_box, PATINA_OT_add_clip_plane
-from . import rows
+from . import rows, trust
 from .panels import PatinaPanel
 from .statistics import SidebarPanel
 
@@ -49,6 +49,7 @@ class _FirstLines:
             rows.sentence(context, layout, "No light reaches this cloud", 'ERROR')
             layout.operator(add_light.PATINA_OT_add_light.bl_idname, icon='LIGHT_SUN')
         rows.automatic(layout, patina, "radius").active = context.scene.patina.surface in {'AUTO', 'SPLATS'} and not patina.ranges.use
+        trust.draw_slider(layout, patina)
         row = layout.row(heading="Clip", align=True)
         row.use_property_decorate = False
         row.prop(colors, "use_clips", text="")

@@ -33,6 +33,7 @@ class PATINA_MT_points(Menu):
         layout.separator()
         for action, text in (('SELECT', "All"), ('DESELECT', "None"), ('INVERT', "Invert")):
             layout.operator("object.patina_points_select_all", text=text).action = action
+        layout.operator("object.patina_select_untrusted", text="Untrusted")
         layout.separator()
         layout.operator("object.patina_points_hide", text="Hide Selected").unselected = False
         layout.operator("object.patina_points_hide", text="Hide Unselected").unselected = True
@@ -57,6 +58,7 @@ class PATINA_PT_points_edit(_LinkedPanel, Panel):
         row = column.row(align=True)
         for action, text in (('SELECT', "All"), ('DESELECT', "None"), ('INVERT', "Invert")):
             row.operator("object.patina_points_select_all", text=text).action = action
+        column.operator("object.patina_select_untrusted")
         row = layout.row(align=True)
         row.prop(group, "class_number")
         operator = row.operator("object.patina_points_select_by", text="Select")

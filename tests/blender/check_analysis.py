@@ -246,12 +246,12 @@ def test_range_images_need_none():
     for name in ("Combined", "Depth", "Normal"):
         check((bare[name] == analyzed[name]).all(), f"{name} differs by {np.abs(bare[name] - analyzed[name]).max()}")
     obj.patina.analysis = 'AUTO'
-    for asks in ("hide_stray", "cull_back"):
+    for asks, value in (("cull_back", True), ("least_trust", 0.5)):
         clouds.CACHE.clear()
-        setattr(obj.patina, asks, True)
+        setattr(obj.patina, asks, value)
         render()
         check(only_cloud().has_shapes, asks)
-        setattr(obj.patina, asks, False)
+        obj.patina.property_unset(asks)
     clouds.CACHE.clear()
     layer = scene.view_layers[0].patina
     layer.use_pass_trust = True
@@ -447,7 +447,7 @@ def test_frame_soft_points():
 
 
 def test_hidden_points():
-    """Stray, doubtful, uncolored and unclassified points are left out, each by its own switch, without another analysis."""
+    """Untrusted, uncolored and unclassified points are left out, each by its own switch, without another analysis."""
     fresh_scene(160, 120)
     ball = sphere(4000)[0]
     stray = np.array([[-1.4, 0.9, -4], [1.4, 0.9, -4], [-1.4, -0.9, -4]])
@@ -471,10 +471,6 @@ def test_hidden_points():
     count, alpha = shown()
     check(count == 0 and alpha.sum() > 0.9 * everything.sum() and not said("Analyzing"), f"{count} strays, {alpha.sum()} pixels")
     obj.patina.least_trust = 0.0
-    obj.patina.hide_stray = True
-    count, alpha = shown()
-    check(count == 0 and alpha.sum() > 0.9 * everything.sum(), f"hidden kind: {count} strays, {alpha.sum()} pixels")
-    obj.patina.hide_stray = False
     obj.patina.hide_unclassified = True
     count, alpha = shown()
     check(count == 2 and not alpha[50:70, 80 + 40:80 + 50].any() and alpha[:, 30:80].any(), "unclassified")

@@ -98,12 +98,14 @@ def switches():
 
 
 def test_automatic_is_a_box():
-    """Zero is automatic; the box gives a number to begin with, and takes it; scripts see the number alone."""
+    """Zero is automatic, and -1 where zero is a number of the artist's; the box gives a number to begin with, and takes it; scripts see
+    the number alone."""
     found = list(switches())
     check(len(found) >= 11, f"{[name for _, _, name in found]}")
     for group, number, box in found:
         kind = group.bl_rna.properties[number]
-        check(kind.default == 0 and not getattr(group, box), f"{number}: it begins as {kind.default}")
+        automatic = -1 if number == "least_trust" else 0
+        check(kind.default == automatic and not getattr(group, box), f"{number}: it begins as {kind.default}")
         setattr(group, box, True)
         value = getattr(group, number)
         check(value > 0 and getattr(group, box), f"{number}: ticked, it is {value}")
@@ -111,7 +113,7 @@ def test_automatic_is_a_box():
         setattr(group, box, True)
         check(getattr(group, number) == (kind.type == 'INT' and 7 or 0.5), f"{number}: ticked twice")
         setattr(group, box, False)
-        check(getattr(group, number) == 0 and not getattr(group, box), f"{number}: {getattr(group, number)}")
+        check(getattr(group, number) == automatic and not getattr(group, box), f"{number}: {getattr(group, number)}")
     lines = bpy.context.scene.patina.lines
     lines.near, lines.far = 30.0, 20.0
     check(not lines.use_far, "not beyond Near is automatic")
@@ -203,13 +205,13 @@ def test_first_lines():
         lines = [drawn for cls, drawn in found.items() if cls.bl_label == "Points"]
         check(len(lines) == 1, f"{place}: {[cls.__name__ for cls in found]}")
         names = [name for kind, owner, name, _ in lines[0] if owner is not None]
-        check(names == ["source", "opacity", "lighting", "use_radius", "use_clips"], f"{place}: {names}")
+        check(names == ["source", "opacity", "lighting", "use_radius", "use_least_trust", "use_clips"], f"{place}: {names}")
         obj.patina.use_radius = True
         obj.patina.colors.source = 'HEIGHT'
         _, found = of_points(place)
         panel = next(cls for cls in found if cls.bl_label == "Points")
         names = [name for _, owner, name, _ in drawn_by(panel, context_of(obj)) if owner is not None]
-        check(names == ["source", "ramp", "opacity", "lighting", "use_radius", "radius", "radius", "use_clips"], f"{place}: {names}")
+        check(names == ["source", "ramp", "opacity", "lighting", "use_radius", "radius", "radius", "use_least_trust", "use_clips"], f"{place}: {names}")
 
 
 def test_first_lines_are_of_points():
@@ -242,7 +244,7 @@ def test_objects_show_nothing_of_the_scene():
     for tab in ("data", "object"):
         _, found = of_points(('PROPERTIES', tab))
         for cls, drawn in found.items():
-            own = [name for _, owner, name, _ in drawn if owner is not None and isinstance(owner.id_data, bpy.types.Scene)]
+            own = [name for _, owner, name, _ in drawn if isinstance(getattr(owner, "id_data", None), bpy.types.Scene)]
             check(not own, f"{cls.__name__} shows {own}")
 
 

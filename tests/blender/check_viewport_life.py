@@ -162,7 +162,7 @@ def test_histogram_follows():
     def line():
         """Where the threshold stands in the picture of what is known now; None while that is not painted."""
         known = histogram.of(obj)
-        if known is None or not histogram.icon(obj, known) or histogram._painted.get(obj.name) != (
+        if known is None or not histogram.icon(obj, known) or histogram._painted.get(histogram._title(obj.name)) != (
                 known.stamp, soft.threshold, soft.transition):
             return None
         return int(np.flatnonzero((np.abs(histogram.pixels(obj) - histogram._LINE).max(-1) < 0.01).all(0))[-1])

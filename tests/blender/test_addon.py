@@ -22,7 +22,7 @@ MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "chec
            "check_linked", "check_building", "check_copc", "check_pages", "check_ept", "check_edits", "check_files", "check_places",
            "check_preferences", "check_set_up",
            "check_sequence", "check_motion", "check_panorama", "check_migrate", "check_meshes", "check_textures", "check_combine",
-           "check_clouds", "check_session", "check_effects", "check_lines", "check_splats", "check_pace", "check_analysis", "check_edit_mode",
+           "check_clouds", "check_session", "check_effects", "check_lines", "check_splats", "check_pace", "check_analysis", "check_edit_mode", "check_trust",
            "check_losses", "check_roles", "check_kept", "check_world", "check_materials", "check_nodes", "check_cryptomatte",
            "check_soft", "check_soft_looks", "check_scans", "check_grids", "check_newcomers", "check_farm",
            "check_gpu")  # the last: with graphics in the background others would have them too

@@ -51,6 +51,7 @@ def tests():
     import check_overlays
     import check_view_copc
     import check_view_edits
+    import check_view_trust
     import check_viewport
     import check_viewport_life
     import check_viewport_samples
@@ -66,7 +67,8 @@ def tests():
         import figures
         yield "figures", figures.orbit_figures
         return
-    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_view_copc, check_view_edits, check_newcomer)
+    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_view_copc, check_view_edits, check_view_trust,
+               check_newcomer)
     known = {name.removeprefix("test_"): test for module in modules for name, test in vars(module).items() if name.startswith("test_")}
     wrong = sorted((ONCE | DRAWN | ALONE) - set(known))
     assert not wrong, f"lists of test_window.py: no test is called {', '.join(wrong)}"

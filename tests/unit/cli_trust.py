@@ -69,5 +69,5 @@ def test_none_is_trusted():
     assert none and drawn[1.0][1]["none_trusted"] in (0, 60), "no threshold leaves all of them out"
     for least, (picture, told, warnings) in drawn.items():
         assert warnings == (least in none) and told["none_trusted"] == 60 * (least in none), (least, told)
-        assert (picture == everything) or not (least in none), least
+        assert (picture == everything) or least not in none, least
     assert not drawn[0.0][2]
