@@ -4,6 +4,7 @@
 #include "shared/measured.h"
 
 #include <stdio.h>
+#include <string.h>
 
 int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions)
 {
@@ -15,6 +16,24 @@ int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
     return pt_gl_program(d, name, definitions, &d->programs[kernel][variant]);
 }
 
+void pt_gl_use(struct pt_gl_device *d, GLuint program)
+{
+    if (d->program != program)
+        d->gl.UseProgram(program);
+    d->program = program;
+}
+
+void pt_gl_bound_forget(struct pt_gl_device *d)
+{
+    memset(d->blocks, 0, sizeof d->blocks);
+    memset(d->texels_of, 0, sizeof d->texels_of);
+}
+
+int pt_gl_check_dispatch(struct pt_gl_device *d, const char *doing)
+{
+    return d->base.info.hardware ? PATINA_OK : pt_gl_check(d, doing);
+}
+
 int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what)
 {
     if (size > d->block_size)
@@ -22,6 +41,10 @@ int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t off
                           "%s: a buffer of %zu bytes; this OpenGL driver's shaders reach %zu at most", what, size,
                           d->block_size);
     size_t padded = size ? (size + 15) & ~(size_t)15 : 16; // as buffers are made
+    struct pt_gl_bound *bound = &d->blocks[binding];
+    if (bound->name == name && bound->offset == offset && bound->size == padded)
+        return PATINA_OK;
+    *bound = (struct pt_gl_bound){name, offset, padded};
     d->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, name, (GLintptr)offset, (GLsizeiptr)padded);
     return PATINA_OK;
 }
@@ -37,8 +60,13 @@ int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, si
     if (texels > d->texels)
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
                           "a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most", texels, d->texels);
+    struct pt_gl_bound *bound = &d->texels_of[unit];
+    if (bound->name == name && bound->offset == offset && bound->size == size)
+        return PATINA_OK;
     d->gl.ActiveTexture(GL_TEXTURE0 + unit);
-    d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
+    if (!bound->name)
+        d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
+    *bound = (struct pt_gl_bound){name, offset, size};
     d->gl.TexBufferRange(GL_TEXTURE_BUFFER, pt_gl_units[unit].format, name, (GLintptr)offset,
                          (GLsizeiptr)(size ? size : 16)); // as buffers are made
     return PATINA_OK;
@@ -92,9 +120,8 @@ int pt_gl_bind_buffers(struct pt_gl_device *d, const struct pt_gl_work *work)
 void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size)
 {
     d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->arguments);
-    d->gl.BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)((size + 15) & ~(size_t)15), NULL, GL_STREAM_DRAW);
-    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)size, arguments);
-    d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
+    d->gl.BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)size, arguments, GL_STREAM_DRAW);
+    d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, PT_BIND_arguments, d->arguments);
 }
 
 void pt_gl_tell_by_pixel(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant)
@@ -111,13 +138,13 @@ int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t varia
 {
     if (x && y) {
         pt_gl_tell_by_pixel(d, kernel, variant);
-        d->gl.UseProgram(d->programs[kernel][variant]);
+        pt_gl_use(d, d->programs[kernel][variant]);
         d->gl.DispatchCompute(x, y, 1);
         d->gl.MemoryBarrier(PT_GL_BARRIERS);
     }
     char doing[64];
     snprintf(doing, sizeof doing, "running %s", pt_kernels[kernel].name);
-    return pt_gl_check(d, doing);
+    return pt_gl_check_dispatch(d, doing);
 }
 
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y)

@@ -263,6 +263,7 @@ static int destroy_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
     pt_gl_tiles_forget(d);
+    pt_gl_bound_forget(d);
     if (!d->lost) // a lost context has taken its buffers along
         d->gl.DeleteBuffers(1, &b->buffer->name);
     return PATINA_OK;
@@ -289,7 +290,11 @@ static int fill_buffer(struct pt_gl_device *d, void *context)
     return pt_gl_clear(d, b->buffer->name, b->offset, b->size, (const uint32_t[]){low, high, low, high});
 }
 
-static int run_kernel(struct pt_gl_device *d, void *context) { return pt_gl_run(d, context); }
+static int run_kernel(struct pt_gl_device *d, void *context)
+{
+    const int result = pt_gl_run(d, context);
+    return result == PATINA_OK ? pt_gl_check(d, "running a kernel") : result;
+}
 
 struct tail_call {
     const struct pt_bound_pass *passes;
@@ -299,7 +304,8 @@ struct tail_call {
 static int run_tail(struct pt_gl_device *d, void *context)
 {
     const struct tail_call *f = context;
-    return pt_gl_run_tail(d, f->passes, f->count);
+    const int result = pt_gl_run_tail(d, f->passes, f->count);
+    return result == PATINA_OK ? pt_gl_check(d, "running a kernel") : result;
 }
 
 // ---- several at one go ---------------------------------------------------------------------------------------------------

@@ -48,6 +48,12 @@ enum pt_gl_tile_list {
     PT_GL_TILES_RIM,    // with an empty pixel, and a point in them or in a tile beside them
 };
 
+// What a binding holds, so that binding the same again takes no call.
+struct pt_gl_bound {
+    GLuint name; // 0: not known
+    size_t offset, size;
+};
+
 // Lists of the tiles of one key plane, valid until somebody writes keys.
 struct pt_gl_tiles {
     int valid;
@@ -100,6 +106,8 @@ struct pt_gl_device {
     GLuint tile_programs[2], list_program, clear_program;
     GLuint shown; // the key plane that PT_GL_SCRATCH_SHOWN is of, as long as no kernel writes planes; else 0
     GLuint textures[PT_UNIT_COUNT];
+    struct pt_gl_bound blocks[PT_BINDINGS], texels_of[PT_UNIT_COUNT];
+    GLuint program;  // in use
     GLuint *queries; // timers, query_count of them
     uint32_t query_count;
     // Of clouds that do not lie here whole: ranges.c
@@ -168,6 +176,12 @@ int pt_gl_bind_rows(struct pt_gl_device *d, const struct pt_gl_work *work, uint3
 int pt_gl_is_part(const struct pt_gl_work *work, const struct pt_buffer_row *row);
 int pt_gl_bind_texture(struct pt_gl_device *d, enum pt_unit unit, const struct pt_buffer *plane);
 int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, size_t offset, size_t size); // a part of a buffer
+// Uses a program, unless it is in use.
+void pt_gl_use(struct pt_gl_device *d, GLuint program);
+// After buffers were deleted: their names may come again.
+void pt_gl_bound_forget(struct pt_gl_device *d);
+// pt_gl_check behind a dispatch, in software. On a GPU the end of a call checks for all dispatches: a check waits for the driver's thread.
+int pt_gl_check_dispatch(struct pt_gl_device *d, const char *doing);
 // Before a program runs: whether it finds what points have by pixel (ranges.c).
 void pt_gl_tell_by_pixel(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant);
 // A grid of at least `count` workgroups, within every driver's limits.

@@ -27,20 +27,20 @@ int pt_gl_list_groups(struct pt_gl_device *d, uint32_t binding, uint32_t count, 
     d->gl.ProgramUniform1ui(d->list_program, 0, (GLuint)(stride / 4));
     d->gl.ProgramUniform1ui(d->list_program, 1, entries);
     d->gl.ProgramUniform1ui(d->list_program, 2, parts);
-    d->gl.UseProgram(d->list_program);
+    pt_gl_use(d, d->list_program);
     d->gl.DispatchCompute(count, 1, 1);
     d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-    return pt_gl_check(d, "counting a list");
+    return pt_gl_check_dispatch(d, "counting a list");
 }
 
 int pt_gl_list_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head)
 {
     char doing[64];
     pt_gl_tell_by_pixel(d, kernel, variant);
-    d->gl.UseProgram(d->programs[kernel][variant]);
+    pt_gl_use(d, d->programs[kernel][variant]);
     d->gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, name);
     d->gl.DispatchComputeIndirect((GLintptr)head);
     d->gl.MemoryBarrier(PT_GL_BARRIERS);
     snprintf(doing, sizeof doing, "running %s", pt_kernels[kernel].name);
-    return pt_gl_check(d, doing);
+    return pt_gl_check_dispatch(d, doing);
 }

@@ -27,6 +27,7 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
         return result;
     }
     gl->DeleteBuffers(1, &scratch->name);
+    pt_gl_bound_forget(d);
     *scratch = (struct pt_gl_scratch){name, size};
     return PATINA_OK;
 }
@@ -63,10 +64,10 @@ static int clear_block(struct pt_gl_device *d, GLuint name, size_t offset, size_
     d->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, PT_BIND_arguments, name, (GLintptr)base,
                           (GLsizeiptr)(offset - base + PAIR * pairs));
     pt_gl_grid((uint32_t)((pairs + CLEAR_GROUP * CLEAR_EACH - 1) / (CLEAR_GROUP * CLEAR_EACH)), &x, &y);
-    d->gl.UseProgram(d->clear_program);
+    pt_gl_use(d, d->clear_program);
     d->gl.DispatchCompute(x, y, 1);
     d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, PT_BIND_arguments, d->arguments);
-    return pt_gl_check(d, "clearing a buffer");
+    return pt_gl_check_dispatch(d, "clearing a buffer");
 }
 
 // By a kernel: a driver's own clearing was seen to write 40 GB/s where the card's memory takes 4000, and planes are cleared each frame.

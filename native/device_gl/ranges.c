@@ -29,6 +29,7 @@ int pt_gl_range_begin(struct pt_gl_device *d, size_t size)
     if (size <= range->size)
         return PATINA_OK;
     gl->DeleteBuffers(1, &range->name);
+    pt_gl_bound_forget(d);
     *range = (struct pt_gl_scratch){0};
     gl->GenBuffers(1, &range->name);
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, range->name);

@@ -53,7 +53,7 @@ static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
         gl->ProgramUniform1ui(program, 3, (GLuint)t->stride);
         if (i == 1)
             pt_gl_grid((uint32_t)((tiles + GROUP - 1) / GROUP), &x, &y);
-        gl->UseProgram(program);
+        pt_gl_use(d, program);
         gl->DispatchCompute(x, y, 1);
         gl->MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
     }
