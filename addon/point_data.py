@@ -45,6 +45,22 @@ def count_of(data: bpy.types.ID) -> int:
     return len(data.vertices if isinstance(data, bpy.types.Mesh) else data.points)
 
 
+def corners(obj: bpy.types.Object) -> list[tuple[float, float, float]]:
+    """The corners of an object's bounding box, in its own space. Blender's box of a PointCloud also holds the radii of the points, which
+    may be for display alone: theirs is that of the places."""
+    count = count_of(obj.data) if obj.type == 'POINTCLOUD' else 0
+    if not count or POSITION not in obj.data.attributes:
+        return [tuple(corner) for corner in obj.bound_box]
+    places = np.empty(3 * count, np.float32)
+    obj.data.attributes[POSITION].data.foreach_get("vector", places)
+    places = places.reshape(-1, 3)
+    places = places[np.isfinite(places).all(axis=1)]
+    if not len(places):
+        return [tuple(corner) for corner in obj.bound_box]
+    box = places.min(axis=0).tolist(), places.max(axis=0).tolist()
+    return [(box[i & 1][0], box[i >> 1 & 1][1], box[i >> 2][2]) for i in range(8)]
+
+
 def changed(data: bpy.types.ID) -> None:
     """Has Blender draw and evaluate the data anew."""
     if isinstance(data, bpy.types.Mesh):

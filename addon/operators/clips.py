@@ -16,7 +16,7 @@ SMALLEST = 1e-3  # half size of a box around points that lie in a plane
 def _corners(context: Context) -> list[Vector]:
     """World corners of the selected objects' bounding boxes, those of points."""
     def of(obj: Object) -> list[Vector]:
-        return [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
+        return [obj.matrix_world @ Vector(corner) for corner in point_data.corners(obj)]
 
     chosen = [obj for obj in context.selected_objects if point_data.may_have_points(obj)]
     return [corner for obj in chosen for corner in of(obj)]

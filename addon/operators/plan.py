@@ -103,7 +103,7 @@ def _box(context: Context) -> tuple[np.ndarray, np.ndarray] | None:
     depsgraph = context.evaluated_depsgraph_get()
     corners = [obj.matrix_world @ Vector(corner) for obj in context.view_layer.objects
                if obj.select_get() and point_data.may_have_points(obj)
-               for corner in obj.evaluated_get(depsgraph).bound_box]
+               for corner in point_data.corners(obj.evaluated_get(depsgraph))]
     if not corners:
         return None
     table = np.array(corners, np.float64)

@@ -226,6 +226,40 @@ def test_one_value_for_all():
     check_close(attributes._values(One(), 5), np.full((5, 1), 7.0), 0, "one value")
 
 
+def test_single_values_of_nodes():
+    """What a node stores for all points, Blender 5.2 holds once: colors, opacities, classes of such are drawn, of many points too."""
+    needs_clouds()
+    values = (("Col", 'BYTE_COLOR', (1.0, 0.0, 0.0, 1.0)), ("faint", 'FLOAT', 0.5), ("classification", 'INT8', 6), ("flag", 'BOOLEAN', True))
+    for count in (200, 200_000):
+        new_scene()
+        points = given(count)
+        points.colors = None
+        obj = added(points, True)
+        obj.patina.opacity_attribute, obj.patina.lighting = "faint", 'UNLIT'
+        tree = bpy.data.node_groups.new("stores", 'GeometryNodeTree')
+        for side in ('INPUT', 'OUTPUT'):
+            tree.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
+        last = tree.nodes.new('NodeGroupInput').outputs[0]
+        for name, kind, value in values:
+            node = tree.nodes.new('GeometryNodeStoreNamedAttribute')
+            node.data_type, node.domain = kind, 'POINT'
+            node.inputs["Name"].default_value = name
+            next(item for item in node.inputs if item.name == "Value" and item.enabled).default_value = value
+            tree.links.new(last, node.inputs[0])
+            last = node.outputs[0]
+        tree.links.new(last, tree.nodes.new('NodeGroupOutput').inputs[0])
+        obj.modifiers.new("stores", 'NODES').node_group = tree
+        bpy.context.view_layer.update()
+        found = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes["faint"]
+        check(getattr(found, "storage_type", 'SINGLE') == 'SINGLE', "Blender 5.2 stores a value for each point")
+        seen = render()["Combined"]
+        seen = seen[seen[..., 3] > 0]
+        check(len(seen) > 50 and (seen[:, 0] > 0).all() and not seen[:, 1:3].any(), f"{count}: not red: {seen[:3]}")
+        check(abs(seen[:, 3].min() - 0.5) < 0.01 and not reports, f"{count}: opacities from {seen[:, 3].min()}; {reports}")
+        obj.patina.colors.hidden[6] = True
+        check(not render()["Combined"].any(), f"{count}: the class that all have is not hidden")
+
+
 def test_files_hold_point_clouds():
     """Saved, appended, linked and overridden: the picture stays."""
     needs_clouds()

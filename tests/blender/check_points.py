@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 from check_camera import to_pixels
-from harness import Skip, add_points, check, check_close, drawn, linear, new_scene, patina, render, reports, sphere
+from harness import Skip, add_points, check, check_close, drawn, linear, move, new_scene, patina, points_of, render, reports, sphere
 from mathutils import Euler, Matrix
 from patina.sync import attributes, clouds
 
@@ -360,8 +360,7 @@ def test_cache():
         obj.location.x = 0.3
         render()
         check(len(built) == 1, "moving an object rebuilt its cloud")
-        obj.data.vertices[7].co.x += 0.5
-        obj.data.update()
+        move(obj, 7, points_of(obj)[7] + (0.5, 0.0, 0.0))
         render()
         check(len(built) == 2, "changed points were not rebuilt")
     finally:

@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 from harness import Skip, add_light, add_points, check, check_close, new_scene, render, reports, saved, set_world
+from patina import point_data
 
 SIZE = 64
 
@@ -37,7 +38,7 @@ def test_holdout():
         scene = flat_scene()
         back, hole = square(-5.0, 1.5, "back", 'POINTS'), square(-4.0, 0.75, "hole", kind)
         front = square(-3.0, 0.4, "front", 'POINTS', x=-0.75)
-        front.data.attributes["Col"].data.foreach_set("color_srgb", np.tile(np.float32([1, 0, 0, 1]), len(front.data.vertices)))
+        front.data.attributes["Col"].data.foreach_set("color_srgb", np.tile(np.float32([1, 0, 0, 1]), point_data.count_of(front.data)))
         for film in (True, False):
             scene.render.film_transparent = film
             hole.is_holdout = False

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from check_points import pixel
 from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, reports
-from patina import histogram
+from patina import histogram, point_data
 
 COUNT = 9
 
@@ -84,7 +84,7 @@ def test_attribute():
     by(obj, 'ATTRIBUTE', invert=False, use_range=True, range_min=0.0, range_max=100.0, threshold=0.75)
     check(soft(scene, points) == [7, 8], "by a range")
     obj.data.attributes["score"].data.foreach_set("value", np.ascontiguousarray(values[::-1]))
-    obj.data.update()
+    point_data.changed(obj.data)
     check(soft(scene, points) == [0, 1], "numbers that changed")
     by(obj, 'ATTRIBUTE', attribute="nowhere")
     reports.clear()
@@ -100,7 +100,7 @@ def test_weights():
     by(obj, 'ATTRIBUTE', attribute="faint")
     check(soft(scene, points) == [2, 3], "painted weights")
     group.add([4], 1.0, 'REPLACE')
-    obj.data.update()
+    point_data.changed(obj.data)
     check(soft(scene, points) == [2, 3, 4], "painted on")
 
 
@@ -110,11 +110,11 @@ def test_colors_and_classes():
     by(obj, 'LUMINANCE', threshold=0.5)
     check(soft(scene, points) == [4, 5, 6, 7, 8], "bright points")
     obj.data.attributes.new("classification", 'INT', 'POINT').data.foreach_set("value", np.array([2, 3, 4, 5, 6, 2, 3, 64, 9], np.int32))
-    obj.data.update()
+    point_data.changed(obj.data)
     by(obj, 'CLASSES', classes="3-4, 64")
     check(soft(scene, points) == [1, 2, 6, 7], "classes")
     obj.data.attributes.remove(obj.data.attributes["classification"])
-    obj.data.update()
+    point_data.changed(obj.data)
     reports.clear()
     check(soft(scene, points) == [], "no classes: surface")
     check(any("has no classes to be soft by" in text for _, text in reports), f"said so: {reports}")
@@ -252,7 +252,7 @@ def test_histogram():
     check(histogram.of(obj).range == (256.0, 0.0), "its ends changed places")
     values[:5000] = 200.5
     obj.data.attributes["score"].data.foreach_set("value", values)
-    obj.data.update()
+    point_data.changed(obj.data)
     render()
     check_histogram(obj, 1.0 - values / 256.0, "painted")
 
@@ -284,7 +284,7 @@ def test_viewport_takes_what_was_painted():
     moved, _, same = taken()
     check(same is field and moved.soft != item.soft, "another threshold takes the same field")
     obj.data.attributes["score"].data.foreach_set("value", np.zeros(COUNT, np.float32))
-    obj.data.update()
+    point_data.changed(obj.data)
     trusted.forget({("Mesh", obj.data.name_full)})
     _, painted, other = taken()
     check(painted is cloud and other is not field and trusted.reads == 2, "painted numbers make another field of the same cloud")
@@ -305,7 +305,7 @@ def middle(scene, point):
 
 
 def numbers(obj, name="soft"):
-    values = np.empty(len(obj.data.vertices), np.float32)
+    values = np.empty(point_data.count_of(obj.data), np.float32)
     obj.data.attributes[name].data.foreach_get("value", values)
     return values
 

@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 from check_import import import_ply, write_ply
 from check_points import grid, pixel
-from harness import SCRATCH, Skip, add_points, check, check_close, drawn, linear, new_scene, render, reports
-from patina import importers
+from harness import SCRATCH, Skip, add_points, check, check_close, drawn, linear, move, new_scene, render, reports
+from patina import importers, point_data
 from patina.sync import attributes, splats
 
 COLOR = (200, 60, 40)
@@ -53,7 +53,7 @@ def test_radius():
 
 def test_without_radius():
     scene, points, obj = discs()
-    obj.data.vertices[0].co = obj.data.vertices[1].co  # their spacing is that of the others still
+    move(obj, 0, points[1])  # their spacing is that of the others still
     scene.patina.surface = 'FILL'
     scene.patina.fill = 'OFF'
     few = len(drawn(render()))
@@ -66,7 +66,7 @@ def test_radius_attribute():
     got = size_of(scene, points, render())
     check(np.all(got[:6] > 5) and np.all(got[6:] == 1), f"pixels {got}")
     obj.data.attributes["size"].data.foreach_set("value", np.full(12, 0.1, np.float32))
-    obj.data.update()
+    point_data.changed(obj.data)
     got = size_of(scene, points, render())
     check(np.all(got > 5), f"changed radii: pixels {got}")
     obj.patina.radius = 0.01
@@ -157,7 +157,8 @@ def test_splats_of_blender():
     opacities = 1 / (1 + np.exp(-LOGITS))
     shape = [("scale", 'FLOAT_VECTOR', np.exp(SIZES)), ("rotation", 'QUATERNION', TURNS)]
     four = 'FLOAT4' if 'FLOAT4' in bpy.types.Attribute.bl_rna.properties["data_type"].enum_items else 'FLOAT_COLOR'  # from 5.2 on; before
-    own = [*shape, ("radiance:base", four, np.column_stack([BASE, opacities])), ("radiance:sh_0", 'FLOAT_VECTOR', np.full((3, 3), 9.0))]
+    own = [*shape, ("radiance:base", four, np.column_stack([BASE, opacities])), ("radiance:sh_0", 'FLOAT_VECTOR', np.full((3, 3), 9.0)),
+           ("of a later version", 'QUATERNION', np.full((3, 4), 9.0)), ("radiance:next", 'FLOAT', np.ones(3))]  # nobody knows these
     usual = [*shape, ("opacity", 'FLOAT', opacities), ("sh_dc", 'FLOAT_VECTOR', BASE)]
     try:
         splats.are = lambda data: isinstance(data, bpy.types.PointCloud)

@@ -19,7 +19,7 @@ SCRATCH = Path(tempfile.mkdtemp(prefix="patina-test-"))
 atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
 
 
-OURS = re.compile(r"(patina|check_\w+|harness|window|screen|figures|session_rounds|copc_files|ept_files|range_server|test_\w+)(\.|$)")
+OURS = re.compile(r"(patina|check_\w+|harness|window|screen|figures|frame_figures|session_rounds|copc_files|ept_files|range_server|test_\w+)(\.|$)")
 deprecated: list[str] = []  # what our modules used that Blender or Python deprecates, since the last take_deprecated()
 _showwarning = warnings.showwarning
 
@@ -129,20 +129,24 @@ def new_scene(width=64, height=48):
     return scene
 
 
+kind = 'MESH'  # of the objects that add_points makes; 'POINTCLOUD': check_kinds.py runs tests once more with these
+
+
 def add_points(positions, colors=None, normals=None, name="points", matrix=None, link=True):
-    """A vertex-only mesh object. colors: uint8 (sRGB) or float32 (linear), (n, 4); normals: attribute "Normal"."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(len(positions))
-    mesh.vertices.foreach_set("co", np.asarray(positions, np.float32).reshape(-1))
+    """An object of points alone: a mesh, or a PointCloud where `kind` says so. colors: uint8 (sRGB) or float32 (linear), (n, 4); normals:
+    attribute "Normal"."""
+    data = point_data.new(name, np.asarray(positions, np.float32).reshape(-1, 3), kind == 'POINTCLOUD')
     if colors is not None and colors.dtype == np.uint8:
-        attribute = mesh.attributes.new("Col", 'BYTE_COLOR', 'POINT')
+        attribute = data.attributes.new("Col", 'BYTE_COLOR', 'POINT')
         attribute.data.foreach_set("color_srgb", (colors / np.float32(255)).reshape(-1))
     elif colors is not None:
-        mesh.attributes.new("Col", 'FLOAT_COLOR', 'POINT').data.foreach_set("color", colors.reshape(-1))
+        data.attributes.new("Col", 'FLOAT_COLOR', 'POINT').data.foreach_set("color", colors.reshape(-1))
     if normals is not None:
         values = np.asarray(normals, np.float32).reshape(-1)
-        mesh.attributes.new("Normal", 'FLOAT_VECTOR', 'POINT').data.foreach_set("vector", values)
-    obj = bpy.data.objects.new(name, mesh)
+        data.attributes.new("Normal", 'FLOAT_VECTOR', 'POINT').data.foreach_set("vector", values)
+    if kind == 'POINTCLOUD':
+        data = point_data.finished(data, True)
+    obj = bpy.data.objects.new(name, data)
     obj.matrix_world = Matrix(matrix) if matrix is not None else Matrix()
     if link:
         bpy.context.scene.collection.objects.link(obj)
@@ -185,6 +189,15 @@ def points_of(obj):
     """(n, 3) float32: an object's own points, of a mesh or a PointCloud."""
     count = point_data.count_of(obj.data)
     return attributes.positions(obj.data, count) if count else np.zeros((0, 3), np.float32)
+
+
+def move(obj, index, place):
+    """Puts a point of an object, mesh or PointCloud, somewhere else in its own space."""
+    if obj.type == 'MESH':
+        obj.data.vertices[index].co = place
+    else:
+        obj.data.attributes["position"].data[index].vector = place
+    point_data.changed(obj.data)
 
 
 # ---- pictures ------------------------------------------------------------------------------------------------
