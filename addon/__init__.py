@@ -14,10 +14,10 @@ bl_info = {  # for Blender 3.4 to 4.1; later ones read blender_manifest.toml
 import bpy
 from bpy.app.handlers import persistent
 
-from . import engine, histogram, migrate, operators, overlays, pairs, preferences, properties, render, ui, versions, viewport
+from . import engine, histogram, migrate, operators, overlays, pairs, preferences, properties, render, thinned, ui, versions, viewport
 from .sync import clouds, files, images, meshes
 
-_MODULES = (preferences, properties, files, migrate, pairs, overlays, engine, operators, ui)
+_MODULES = (preferences, properties, files, migrate, pairs, overlays, thinned, engine, operators, ui)
 _UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 
 

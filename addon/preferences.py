@@ -15,6 +15,7 @@ from .properties.automatic import switch
 GIGA = 1 << 30
 CACHE_GIGA = 32  # of clouds on the disk, 23 bytes a point: a sequence has many
 PAGES_GIGA = 8  # of fetched parts of files, some 10 bytes a point
+PREVIEW_POINTS = 50_000  # of each cloud, in Solid shading and the like
 
 
 def get() -> PatinaPreferences | None:
@@ -38,6 +39,12 @@ def cloud_bytes() -> int:
     """How much a picture may hold of linked clouds at a time; 0: by what is free."""
     known = get()
     return GIGA * known.cloud_limit if known else 0
+
+
+def preview_points() -> int:
+    """How many points of each cloud Solid and Material Preview shading show."""
+    known = get()
+    return known.preview_points if known else PREVIEW_POINTS
 
 
 def _use(group: PatinaPreferences, _context: Context) -> None:
@@ -85,6 +92,10 @@ class PatinaPreferences(AddonPreferences):
         description="Memory for linked clouds, in gigabytes. Larger clouds are read in several rounds, with the same result")
     use_cloud_limit: switch("cloud_limit", 4, "Use a fixed limit. Disabled: a third of the free memory", "Set Linked Clouds")
 
+    preview_points: IntProperty(
+        name="Points in Solid", default=PREVIEW_POINTS, min=0, soft_max=1_000_000, max=100_000_000,
+        description="Points of each cloud that Wireframe, Solid and Material Preview shading show in their colors; 0 shows none. Renders "
+                    "draw all points")
     online: BoolProperty(
         name="Allow Online Access", default=False,
         description="Allow downloads from addresses that you open. In Blender 4.2 and later, Blender's own setting under System applies")
@@ -120,6 +131,7 @@ class PatinaPreferences(AddonPreferences):
         rows.automatic(column, self, "threads")
         rows.automatic(column, self, "memory_limit", text="Memory (GB)")
         rows.automatic(column, self, "cloud_limit", text="Linked Clouds (GB)")
+        column.prop(self, "preview_points")
         if not hasattr(bpy.app, "online_access"):
             column.prop(self, "online")
         column = layout.column()

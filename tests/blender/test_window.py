@@ -3,7 +3,7 @@
 
     xvfb-run -a -s "-screen 0 1280x800x24" blender --enable-event-simulate --factory-startup --python tests/blender/test_window.py [-- NAME ...]
 
-NAME figures measures instead (figures.py); long_session is for long_session.py. --some leaves out what neither Blender's version nor its
+NAME figures measures instead (figures.py), and frames (frame_figures.py); long_session is for long_session.py. --some leaves out what neither Blender's version nor its
 graphics change (ONCE), --drawn runs only tests that look at what Blender's graphics drew (DRAWN): for a second backend. A test is a
 generator: it yields what it waits for, a function that says whether it has come.
 """
@@ -26,11 +26,13 @@ ALONE = {"newcomers_clicks"}  # run by their names only: they want Blender as it
 ONCE = {"a_changed_link_keeps_nobody_waiting", "a_damaged_cache_is_mended", "a_spoilt_link_is_left_out", "analysis_refines", "balance_is_live",
         "betters_at_rest", "copc_from_a_slow_server", "copc_grows_sharper", "copc_of_a_server_that_goes_away",
         "eevee_and_points_hide_each_other", "failure_is_said", "holdout_betters", "many_points_come_by_detail", "moving_begins_again",
-        "navigation_and_rest", "noise_ends_it", "processor_takes_over", "range_images_are_not_analyzed"}
+        "navigation_and_rest", "noise_ends_it", "processor_takes_over", "range_images_are_not_analyzed",
+        "thinned_colors_in_material_preview"}
 DRAWN = {"a_new_size_shows_no_stretched_picture", "box_in_the_view", "brush_in_the_view", "clipping_region", "coarse_pictures_fill_the_view",
-         "draws_points", "edit_mode_shows_what_is_selected", "framing_begins_the_view_farther_away", "leaving_midway",
+         "draws_points", "edit_mode_selects_and_deletes", "edit_mode_shows_what_is_selected", "framing_begins_the_view_farther_away", "leaving_midway",
          "overlays_are_hidden_by_points", "panels_are_drawn_without_errors", "points_hide_their_dots", "quad_view", "the_world_lies_behind",
-         "toggling_lets_go", "too_bright_is_white", "what_changes_is_read", "what_is_left_out_shows_no_dots", "wide_points_hide_their_dots",
+         "thinned_colors_in_solid", "thinned_points_are_hidden_by_what_is_nearer", "toggling_lets_go", "too_bright_is_white",
+         "what_changes_is_read", "what_is_left_out_shows_no_dots", "wide_points_hide_their_dots",
          "wide_points_leave_what_is_before_them"}
 # What an option runs, and how the results call these tests.
 CHOICES = {"--some": (lambda name: name not in ONCE, "window tests, those that depend on Blender's version"),
@@ -46,9 +48,12 @@ def work():
 def tests():
     import setting
     importlib.import_module("harness")  # registers the add-on, which the others ask for
+    import check_cloud_edits
     import check_drawn
+    import check_drop
     import check_newcomer
     import check_overlays
+    import check_thinned
     import check_view_copc
     import check_view_edits
     import check_view_trust
@@ -67,8 +72,12 @@ def tests():
         import figures
         yield "figures", figures.orbit_figures
         return
-    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_view_copc, check_view_edits, check_view_trust,
-               check_newcomer)
+    if names == ["frames"]:
+        import frame_figures
+        yield "frames", frame_figures.frame_figures
+        return
+    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_thinned, check_drawn,
+               check_drop, check_cloud_edits, check_view_copc, check_view_edits, check_view_trust, check_newcomer)
     known = {name.removeprefix("test_"): test for module in modules for name, test in vars(module).items() if name.startswith("test_")}
     wrong = sorted((ONCE | DRAWN | ALONE) - set(known))
     assert not wrong, f"lists of test_window.py: no test is called {', '.join(wrong)}"
