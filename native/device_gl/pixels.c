@@ -124,13 +124,27 @@ int pt_gl_shade(struct pt_gl_device *d, const struct pt_gl_work *work)
 
 enum { FIND = 0, MIX = 1, APPLY = 2 };
 
+// On a GPU: colours of edges lie by pixel, and which pixels are edges in a word for each invocation that walks a line of tiles.
+static int antialias_lines(struct pt_gl_device *d, uint32_t variant)
+{
+    const size_t groups = ((size_t)d->tiles.columns * d->tiles.rows + 3) / 4, size = PT_GL_LIST_HEAD + groups * GROUP / 2 * 4;
+    int result = pt_gl_scratch(d, PT_GL_SCRATCH_PIXELS, size, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, PT_BIND_antialias_edges, d->scratch[PT_GL_SCRATCH_PIXELS].name, 0, size, "antialias");
+    if (result == PATINA_OK)
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, variant + FIND, PT_GL_TILES_POINTS);
+    return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, variant + APPLY, PT_GL_TILES_POINTS) : result;
+}
+
 int pt_gl_antialias(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
+    const int hardware = (int)d->base.info.hardware;
     const struct antialias_args *args = work->arguments;
     const uint32_t variant = 3 * args->behind + 6 * args->inked, *rect = args->view.rect;
-    const size_t size = (size_t)(rect[2] - rect[0]) * (rect[3] - rect[1]) * 16; // if all were edges
+    const size_t size = hardware ? (size_t)args->view.width * args->view.height * 16
+                                 : (size_t)(rect[2] - rect[0]) * (rect[3] - rect[1]) * 16; // if all were edges
     int result = PATINA_OK;
-    for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step++) {
+    for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step += hardware ? APPLY - FIND : 1) {
         char definitions[64];
         snprintf(definitions, sizeof definitions, "#define STEP %u\n#define BEHIND %u\n#define INKED %u\n", step, args->behind,
                  args->inked);
@@ -140,6 +154,8 @@ int pt_gl_antialias(struct pt_gl_device *d, const struct pt_gl_work *work)
         result = pt_gl_scratch(d, PT_GL_SCRATCH_SHADED, size, 0);
     if (result == PATINA_OK)
         result = pt_gl_bind(d, PT_BIND_antialias_mixed, d->scratch[PT_GL_SCRATCH_SHADED].name, 0, size, "antialias");
+    if (result == PATINA_OK && hardware)
+        return antialias_lines(d, variant);
     if (result == PATINA_OK)
         result = make_list(d, PT_BIND_antialias_edges, TILE_PIXELS, PT_KERNEL_antialias, variant + FIND, GROUP);
     if (result == PATINA_OK)

@@ -8,12 +8,18 @@
 //
 // Edges are few: they are listed, their new colours made, and applied when every pixel has been looked at.
 //   STEP 0: find;   STEP 1: mix, an edge an invocation;   STEP 2: apply
+// On a GPU STEP 0 mixes too, and leaves a bit a pixel in place of the list: a word for each invocation's line.
 //   BEHIND, INKED: as in the arguments, known beforehand: software would read the through and line planes for nothing.
 #version 430 core
 #include "shared/colors.h"
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
-#if STEP == 0
+#ifdef PT_SOFTWARE
+#define LISTS 1
+#else
+#define LISTS 0
+#endif
+#if STEP == 0 || !LISTS
 #include "lib/tiles.glsl"
 #else
 layout(local_size_x = 64) in;
@@ -28,6 +34,35 @@ layout(std430, binding = BIND_edges) buffer edges_block { uint edge_groups[3], e
 layout(std430, binding = BIND_mixed) buffer mixed_block { vec4 mixed[]; };
 
 #include "lib/edges.glsl"
+
+#if STEP == 1 || (STEP == 0 && !LISTS)
+
+// What an edge becomes.
+vec4 mix_of(uint at)
+{
+    ivec2 size = ivec2(args.view.width, args.view.height);
+    uvec2 pixel = pt_pixel(at, uint(size.x));
+    float limit = step_limit(args.layers != 0u, at, read_z_bits(at));
+    precise vec4 sum = vec4(0.0);
+    float count = 0.0;
+    for (int i = 0; i < 4; i++) {
+        uint q = neighbour(size, int(pixel.x), int(pixel.y), i);
+        float z = read_z(q);
+        if (!is_far(q, z, limit))
+            continue;
+        count += 1.0;
+        if (z < pt_float(PT_KEY_EMPTY_Z))
+            sum = sum + read_float4(q);
+    }
+    float coverage = edge_coverage(args, read_key(at).x, count);
+    precise float share = (1.0 - coverage) * pt_rcp(count);
+    precise vec4 mix_color = read_float4(at) * coverage + sum * share;
+    return mix_color;
+}
+
+#endif
+
+uint entry_index() { return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x; }
 
 #if STEP == 0
 
@@ -71,52 +106,36 @@ void main()
         behind = z;
         z = ahead;
     } while (++i < steps);
+#if LISTS
     if (found == 0u)
         return;
-    uint at = atomicAdd(edge_count, uint(bitCount(found)));
-    for (; found != 0u; found &= found - 1u, at++) {
+    uint to = atomicAdd(edge_count, uint(bitCount(found)));
+#else
+    edges[entry_index()] = found;
+#endif
+    for (; found != 0u; found &= found - 1u) {
         uvec2 here = first + uint(findLSB(found)) * PT_STEP;
-        edges[at] = here.y * view.width + here.x;
+        uint at = here.y * view.width + here.x;
+#if LISTS
+        edges[to++] = at;
+#else
+        mixed[at] = mix_of(at);
+#endif
     }
 }
 
 #else
-
-uint entry_index()
-{
-    return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
-}
 
 #if STEP == 1
 
 void main()
 {
-    bool layers = args.layers != 0u;
-    ivec2 size = ivec2(args.view.width, args.view.height);
     uint index = entry_index();
-    if (index >= edge_count)
-        return;
-    uint at = edges[index], z_bits = read_z_bits(at);
-    uvec2 pixel = pt_pixel(at, uint(size.x));
-    float limit = step_limit(layers, at, z_bits);
-    precise vec4 sum = vec4(0.0);
-    float count = 0.0;
-    for (int i = 0; i < 4; i++) {
-        uint q = neighbour(size, int(pixel.x), int(pixel.y), i);
-        float z = read_z(q);
-        if (!is_far(q, z, limit))
-            continue;
-        count += 1.0;
-        if (z < pt_float(PT_KEY_EMPTY_Z))
-            sum = sum + read_float4(q);
-    }
-    float coverage = edge_coverage(args, read_key(at).x, count);
-    precise float share = (1.0 - coverage) * pt_rcp(count);
-    precise vec4 mix_color = read_float4(at) * coverage + sum * share;
-    mixed[index] = mix_color;
+    if (index < edge_count)
+        mixed[index] = mix_of(edges[index]);
 }
 
-#else
+#elif LISTS
 
 void main()
 {
@@ -126,6 +145,21 @@ void main()
     uint at = edges[index];
     color[at] = mixed[index];
     from[at] |= PT_FROM_MIXED;
+}
+
+#else
+
+void main()
+{
+    uvec2 first = pt_tile_line(args.view);
+    if (pt_tile_steps(args.view, first) == 0u)
+        return;
+    for (uint found = edges[entry_index()]; found != 0u; found &= found - 1u) {
+        uvec2 here = first + uint(findLSB(found)) * PT_STEP;
+        uint at = here.y * args.view.width + here.x;
+        color[at] = mixed[at];
+        from[at] |= PT_FROM_MIXED;
+    }
 }
 
 #endif
