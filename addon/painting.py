@@ -7,7 +7,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from . import graphics
+from . import graphics, native
 
 _compiled = graphics.Shaders()  # by what they draw
 
@@ -18,16 +18,7 @@ def forget() -> None:
 
 def covering(depth: np.ndarray) -> np.ndarray:
     """The nearest of 5 x 5 pixels, for all pixels. Here and not in the shader: a GPU in software takes ten times as long."""
-    height, width = depth.shape[:2]
-    wide = np.pad(depth[..., 0], 2, mode='edge')
-    for axis, size in ((0, height), (1, width)):
-        def shifted(values: np.ndarray, by: int, length: int, axis: int = axis) -> np.ndarray:
-            return values[by:by + length] if axis == 0 else values[:, by:by + length]
-
-        two = np.minimum(shifted(wide, 0, size + 3), shifted(wide, 1, size + 3))
-        four = np.minimum(shifted(two, 0, size + 1), shifted(two, 2, size + 1))
-        wide = np.minimum(shifted(four, 0, size), shifted(four, 1, size))
-    return wide[..., None]
+    return native.nearest_depths(depth)
 
 
 _VERTEX = """

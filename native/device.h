@@ -103,7 +103,8 @@ struct pt_counts {
     // OpenGL. empty: dispatches without a workgroup (direct ones; indirect ones of frames that are measured). copies: of buffers to
     // buffers, and uploads into parts of buffers. waits: calls that block until submitted work is done.
     uint64_t dispatches, empty, barriers, calls, copies, waits;
-    uint64_t steps; // processor: steps of its threads, each of which ends with a barrier
+    uint64_t uploaded; // bytes that the host handed to the driver
+    uint64_t steps;    // processor: steps of its threads, each of which ends with a barrier
 };
 
 // What was asked between two counts.
@@ -115,6 +116,7 @@ static inline struct pt_counts pt_counts_between(const struct pt_counts *before,
                               .calls = after->calls - before->calls,
                               .copies = after->copies - before->copies,
                               .waits = after->waits - before->waits,
+                              .uploaded = after->uploaded - before->uploaded,
                               .steps = after->steps - before->steps};
 }
 

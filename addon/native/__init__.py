@@ -45,7 +45,7 @@ from .loader import (
 
 __all__ = ["CANCELLED", "FILE", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
            "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "TOO_MANY_POINTS", "Task", "Texture", "WRAPS",
-           "forget_library", "library", "library_path", "log_lines", "losses", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
+           "forget_library", "library", "library_path", "log_lines", "losses", "nearest_depths", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
 
 
 KINDS = tuple(abi.KIND)  # patina_kind
@@ -158,6 +158,14 @@ def _describe(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndar
     return abi.CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
                       color=_view(colors, count), opacity=_view(opacities, count), radius=_view(radii, count),
                       scalar=_view(scalars, count), classes=_view(classes, count), threads=threads, origin=origin)
+
+
+def nearest_depths(depth: np.ndarray) -> np.ndarray:
+    """The nearest of 5 x 5 pixels, for all pixels; (height, width, 1) float32."""
+    depth = np.ascontiguousarray(depth, np.float32)
+    nearest = np.empty_like(depth)
+    check(library().patina_nearest_depths(depth.ctypes.data, depth.shape[1], depth.shape[0], nearest.ctypes.data, nearest.nbytes))
+    return nearest
 
 
 def ramp(name: str) -> np.ndarray:

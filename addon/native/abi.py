@@ -351,6 +351,7 @@ CALLS = {
     "patina_frame_progress": (c_void_p,),
     "patina_frame_read": (c_void_p, c_uint32, c_void_p, c_size_t),
     "patina_frame_read_layer": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
+    "patina_nearest_depths": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_frame_read_keys": (c_void_p, c_void_p, c_size_t),
     "patina_frame_bake_shadows": (c_void_p, c_void_p),
     "patina_frame_read_shadows": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),

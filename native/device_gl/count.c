@@ -42,6 +42,8 @@ static void keep_command(GLintptr indirect)
 #define COUNT_INDIRECT (count_dispatch(0), keep_command(indirect))
 #define COUNT_BARRIER (counter->counts.barriers++)
 #define COUNT_COPY (counter->counts.copies++)
+#define COUNT_UPLOAD (counter->counts.uploaded += data ? (uint64_t)size : 0)
+#define COUNT_WRITE (COUNT_COPY, counter->counts.uploaded += (uint64_t)size)
 #define COUNT_WAIT count_wait()
 
 #define NOTHING(name, parameters, arguments, kind)                                                                             \

@@ -74,6 +74,25 @@ int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
+// The keys of the picture, whose rows are parts of the plane's. All rows are read by one call: each call waits for an OpenGL device.
+static int read_crop(const struct patina_frame *frame, const char *call, uint64_t *keys)
+{
+    const uint32_t *crop = frame->shown.crop;
+    const size_t wide = frame->shown.plane_width, count = crop[3] ? wide * (crop[3] - 1) + crop[2] : 0;
+    uint64_t *rows = wide == crop[2] ? keys : malloc((count + 1) * sizeof *rows);
+    if (!rows)
+        return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "%s: out of memory", call);
+    const int error = count ? frame->device->ops->buffer_read(frame->device, &frame->planes.at[PT_PLANE_KEYS][0],
+                                                              (wide * crop[1] + crop[0]) * sizeof *rows, rows,
+                                                              count * sizeof *rows)
+                            : PATINA_OK;
+    for (size_t y = 0; y < crop[3] && rows != keys && !error; y++)
+        memcpy(keys + y * crop[2], rows + y * wide, crop[2] * sizeof *keys);
+    if (rows != keys)
+        free(rows);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
 // Keys as they lie in the plane. call: whose messages these are.
 static int read_plane(const struct patina_frame *frame, const char *call, uint64_t *keys, size_t size)
 {
@@ -82,15 +101,7 @@ static int read_plane(const struct patina_frame *frame, const char *call, uint64
     if (size != (size_t)frame->shown.crop[2] * frame->shown.crop[3] * sizeof *keys)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "%s: %u x %u keys; got %zu bytes", call, frame->shown.crop[2],
                        frame->shown.crop[3], size);
-    size_t row = (size_t)frame->shown.crop[2] * sizeof *keys;
-    for (uint32_t y = 0; y < frame->shown.crop[3]; y++) {
-        size_t offset = ((size_t)(frame->shown.crop[1] + y) * frame->shown.plane_width + frame->shown.crop[0]) * sizeof *keys;
-        int error = frame->device->ops->buffer_read(frame->device, &frame->planes.at[PT_PLANE_KEYS][0], offset,
-                                                    (char *)keys + y * row, row);
-        if (error)
-            return pt_fail_again(&frame->handle, error);
-    }
-    return PATINA_OK;
+    return read_crop(frame, call, keys);
 }
 
 static int fail_to_number(const struct patina_frame *frame, int error, const char *call)
@@ -216,10 +227,10 @@ static void write_counts(const struct pt_counts *counts, uint64_t bytes, int gl,
     if (gl)
         snprintf(text, size,
                  "{\"dispatches\":%llu,\"empty\":%llu,\"barriers\":%llu,\"calls\":%llu,\"copies\":%llu,\"waits\":%llu,"
-                 "\"bytes\":%llu}",
+                 "\"uploaded\":%llu,\"bytes\":%llu}",
                  (unsigned long long)counts->dispatches, (unsigned long long)counts->empty,
                  (unsigned long long)counts->barriers, (unsigned long long)counts->calls, (unsigned long long)counts->copies,
-                 (unsigned long long)counts->waits, (unsigned long long)bytes);
+                 (unsigned long long)counts->waits, (unsigned long long)counts->uploaded, (unsigned long long)bytes);
     else
         snprintf(text, size, "{\"barriers\":%llu,\"bytes\":%llu}", (unsigned long long)counts->steps,
                  (unsigned long long)bytes);

@@ -16,6 +16,8 @@ static void drop(struct patina_device *device, struct pt_resident *resident)
     device->ops->buffer_destroy(device, &resident->fields[0]);
     device->ops->buffer_destroy(device, &resident->fields[1]);
     device->ops->buffer_destroy(device, &resident->marked);
+    free(resident->given);
+    resident->given = NULL;
 }
 
 static void destroy(struct pt_resident *resident, struct patina_device *device)
@@ -104,6 +106,83 @@ static int upload_colors(struct patina_device *device, const struct patina_cloud
                        &resident->buffers[PT_COLORS]);
 }
 
+// ---- clouds in pages -----------------------------------------------------------------------------------------------------
+
+// What a chunk that is there holds: its page's points, and the class of their spacing.
+static uint64_t holds(const struct patina_cloud *cloud, uint32_t c)
+{
+    uint32_t spacing;
+    memcpy(&spacing, &cloud->chunks[c].spacing, sizeof spacing);
+    return (uint64_t)pt_paged_arrivals(cloud, c) << 32 | spacing;
+}
+
+// Remembers what was uploaded. Without memory for it all pages are uploaded when one changes.
+static void note_pages(const struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
+    if (!cloud->paged || !device->copies || device->ranges.most)
+        return;
+    free(resident->given);
+    resident->given = calloc((size_t)cloud->chunk_count + 1, sizeof *resident->given);
+    for (uint32_t c = pt_chunk_from(cloud, 0); c < cloud->chunk_count && resident->given; c = pt_chunk_from(cloud, c + 1))
+        resident->given[c] = holds(cloud, c);
+}
+
+// Writes `padded` slots from the chunk's first on into all buffers, or into the surface words alone.
+static int write_chunks(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident,
+                        const struct pt_chunk *chunk, size_t padded, int words_alone)
+{
+    const struct {
+        enum pt_instance_buffer which;
+        const void *data;
+    } parts[] = {{PT_SURFELS, cloud->surfels}, {PT_POSITIONS, cloud->positions}, {PT_OPACITIES, cloud->opacities},
+                 {PT_CLASSES, cloud->classes}, {PT_SCALARS, cloud->scalars},     {PT_COLORS, cloud->colors}};
+    int error = PATINA_OK;
+    for (size_t i = 0; i < (words_alone ? 1 : sizeof parts / sizeof *parts) && !error; i++) {
+        struct pt_buffer *buffer = &resident->buffers[parts[i].which];
+        const size_t each = buffer->size / cloud->slots;
+        if (parts[i].data && buffer->size)
+            error = device->ops->buffer_write(device, buffer, chunk->first * each,
+                                              (const char *)parts[i].data + chunk->first * each, padded * each);
+    }
+    return error;
+}
+
+// Uploads the chunks that differ from what the buffers hold, those that lie beside each other at one go.
+static int renew_pages(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
+    int error = PATINA_OK;
+    uint32_t before = 0; // chunks up to here are done
+    for (uint32_t c = pt_chunk_from(cloud, 0); !error; c = pt_chunk_from(cloud, c)) {
+        for (; before < c; before++)
+            resident->given[before] = 0; // absent
+        if (c >= cloud->chunk_count)
+            break;
+        const struct pt_chunk *first = &cloud->chunks[c];
+        const uint64_t had = resident->given[c], has = holds(cloud, c);
+        const int words_alone = had >> 32 == has >> 32;
+        size_t padded = 0;
+        if (had == has) {
+            before = ++c;
+            continue;
+        }
+        while (c < cloud->chunk_count && cloud->chunks[c].count && cloud->chunks[c].first == first->first + padded &&
+               resident->given[c] != holds(cloud, c) && (resident->given[c] >> 32 == holds(cloud, c) >> 32) == words_alone) {
+            padded += cloud->chunks[c].padded;
+            resident->given[c] = holds(cloud, c);
+            c++;
+        }
+        before = c;
+        error = write_chunks(device, cloud, resident, first, padded, words_alone);
+    }
+    for (int i = 0; i < 2; i++)
+        device->ops->buffer_destroy(device, &resident->fields[i]);
+    device->ops->buffer_destroy(device, &resident->marked);
+    if (error)
+        drop(device, resident); // whoever takes it next uploads it whole
+    resident->pages = atomic_load(&cloud->alive->pages) - (error != PATINA_OK);
+    return error;
+}
+
 static int upload_all(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
     int error = PATINA_OK;
@@ -128,6 +207,8 @@ static int upload_all(struct patina_device *device, const struct patina_cloud *c
     error = upload_shapes(device, cloud, resident);
     if (!error)
         error = upload_colors(device, cloud, resident);
+    if (!error)
+        note_pages(device, cloud, resident);
     if (!resident->buffers[PT_POSITIONS].wrapped && !device->ranges.most) // a copy: the file itself need not be held beside it
         pt_cloud_return(cloud);
     return error;
@@ -151,11 +232,16 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
 // What changed since it was uploaded.
 static int renew(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
-    if (resident->pages != atomic_load(&cloud->alive->pages) || !as_now(device, &resident->buffers[PT_POSITIONS])) {
+    const int stale = resident->pages != atomic_load(&cloud->alive->pages);
+    const int by_page = resident->given && !cloud->shapes && !cloud->radii;
+    if ((stale && !by_page) || !as_now(device, &resident->buffers[PT_POSITIONS])) {
         drop(device, resident);
         return upload(device, cloud, resident);
     }
-    int error = resident->shapes == atomic_load(&cloud->alive->shapes) ? PATINA_OK : upload_shapes(device, cloud, resident);
+    int error = stale ? renew_pages(device, cloud, resident) : PATINA_OK;
+    if (error)
+        return error;
+    error = resident->shapes == atomic_load(&cloud->alive->shapes) ? PATINA_OK : upload_shapes(device, cloud, resident);
     if (error || resident->colors == atomic_load(&cloud->alive->colors))
         return error;
     return upload_colors(device, cloud, resident);

@@ -19,6 +19,7 @@ struct pt_resident {
     struct pt_resident *next;
     struct pt_alive *alive;
     uint32_t pages;                        // the state of alive->pages
+    uint64_t *given;                       // of a cloud in pages: what of each chunk the buffers hold; NULL: not known
     uint32_t colors, shapes;               // the states of alive->colors and alive->shapes that the buffers hold
     struct pt_buffer marked;               // colours with what stations saw through in magenta; made when first asked for
     uint32_t marked_colors, marked_shapes; // the states that it holds

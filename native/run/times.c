@@ -35,5 +35,6 @@ void pt_note_work(struct pt_times *times, const char *name, uint64_t bytes, cons
     timing->counts.calls += counts->calls;
     timing->counts.copies += counts->copies;
     timing->counts.waits += counts->waits;
+    timing->counts.uploaded += counts->uploaded;
     timing->counts.steps += counts->steps;
 }

@@ -235,6 +235,7 @@ static void publish(struct patina_cloud *cloud, uint32_t p)
         paged->page_of[page->first_chunk + i] = p;
     }
     page->arrived->area = area;
+    page->arrivals++;
     paged->held += page->slots * bytes_of_point(cloud);
     paged->points += page->told.count;
     count_below(paged, p, 1);

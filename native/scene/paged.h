@@ -39,6 +39,8 @@ static inline uint32_t pt_chunk_from(const struct patina_cloud *cloud, uint32_t 
 }
 // Whether points of the cloud are on their way. patina_cloud_pages_begin's clouds alone.
 int pt_paged_absent(const struct patina_cloud *cloud);
+// How often the page of chunk c, which is there, has arrived: its points are others each time. At least 1.
+uint32_t pt_paged_arrivals(const struct patina_cloud *cloud, uint32_t c);
 // How many chunks are there, at most.
 uint32_t pt_chunks_there(const struct patina_cloud *cloud);
 

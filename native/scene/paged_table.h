@@ -14,6 +14,7 @@ struct pt_page {
     uint32_t first_chunk, chunk_count; // of the whole cloud's
     uint64_t first_number, first_slot, slots;
     struct pt_arrived *arrived; // of a staged or present page
+    uint32_t arrivals;          // how often it has become present
 };
 
 struct pt_arrived {

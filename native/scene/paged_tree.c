@@ -145,6 +145,12 @@ void pt_page_around(const struct patina_cloud *cloud, uint32_t page, struct pt_c
 
 // ---- chunks that are there ---------------------------------------------------------------------------------------------
 
+uint32_t pt_paged_arrivals(const struct patina_cloud *cloud, uint32_t c)
+{
+    const struct pt_paged *paged = cloud->paged;
+    return paged->pages[paged->page_of[cloud->first_chunk + c]].arrivals;
+}
+
 uint32_t pt_paged_chunk_from(const struct patina_cloud *cloud, uint32_t c)
 {
     if (cloud->chunks[c].count)

@@ -413,6 +413,62 @@ static void test_cap(void **state)
     free_tree(tree);
 }
 
+// Bytes that the host handed to the device for the last render; 0: a device that borrows them.
+static uint64_t uploaded(const patina_frame *frame)
+{
+    static const char name[] = "\"uploaded\":";
+    char json[16384];
+    assert_true(patina_frame_stats_json(frame, json, sizeof json) < sizeof json);
+    const char *at = strstr(json, name);
+    return at ? strtoull(at + strlen(name), NULL, 10) : 0;
+}
+
+// One frame goes on while pages arrive, leave and come again: it shows what a new frame shows, and uploads no page that it has.
+static void one_frame(patina_device *device, const char *name)
+{
+    struct tree *tree = make_tree();
+    patina_cloud *cloud = begin(tree, 16 * POINTS);
+    patina_frame *frame = NULL;
+    uint64_t first = 0, most = 0, compared = 0;
+    CHECK(patina_frame_create(device, &frame), device);
+    for (int turn = 0; turn < 4; turn++) // here, away, and here again
+        for (int round = 0; round < 12; round++) {
+            uint32_t wanted[PAGES], count;
+            patina_scene *scene = stage_of(cloud, turn % 2, 0, NULL);
+            CHECK(patina_frame_render(frame, scene), frame);
+            CHECK(patina_cloud_wanted(cloud, 0.0, wanted, turn || round ? 2 : PAGES, &count), cloud);
+            for (uint32_t i = 0; i < count; i++)
+                give(cloud, tree, wanted[i]);
+            CHECK(patina_frame_render(frame, scene), frame);
+            const uint64_t bytes = uploaded(frame);
+            first = first ? first : bytes;
+            most = (turn || round) && bytes > most ? bytes : most;
+            const uint32_t state = atomic_load(&cloud->alive->pages);
+            struct picture one = picture_read(frame), two = draw(device, cloud, turn % 2, 0, NULL);
+            if (state == atomic_load(&cloud->alive->pages)) { // else the second picture began with other pages or spacings
+                picture_assert_identical(&one, &two, 0, 0, name);
+                compared++;
+            }
+            picture_free(&one);
+            picture_free(&two);
+            patina_scene_destroy(scene);
+        }
+    printf("  %s: %.2f MB for the first pages, later %.2f at most; %u pages given back, %llu pictures compared\n", name,
+           1e-6 * (double)first, 1e-6 * (double)most, told(cloud).returned, (unsigned long long)compared);
+    assert_true(told(cloud).returned > 0 && compared > 8);
+    if (support_is_gl(name))
+        assert_true(most > 0 && most < first / 2);
+    patina_frame_destroy(frame);
+    patina_cloud_destroy(cloud);
+    free_tree(tree);
+}
+
+static void test_one_frame(void **state)
+{
+    (void)state;
+    support_each_device(one_frame);
+}
+
 // What arrived, and no picture has taken in yet, is there for other calls; a share of it is not.
 static void test_colors_before_pictures(void **state)
 {
@@ -507,13 +563,10 @@ static void test_in_parts(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_bytes),
-                                       cmocka_unit_test(test_beside_flat),
-                                       cmocka_unit_test(test_partial),
-                                       cmocka_unit_test(test_wanted),
-                                       cmocka_unit_test(test_damaged),
-                                       cmocka_unit_test(test_cap),
-                                       cmocka_unit_test(test_colors_before_pictures),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_beside_flat),
+                                       cmocka_unit_test(test_partial),    cmocka_unit_test(test_wanted),
+                                       cmocka_unit_test(test_damaged),    cmocka_unit_test(test_cap),
+                                       cmocka_unit_test(test_one_frame),  cmocka_unit_test(test_colors_before_pictures),
                                        cmocka_unit_test(test_in_parts)};
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A border render equals the crop of the whole, all passes, bit for bit (SPEC 2.5).
+#include "device.h"
 #include "staging.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static void set_region(patina_settings *settings, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1)
@@ -95,12 +97,46 @@ static void test_tiles(void **state)
     patina_device_destroy(device);
 }
 
+// An OpenGL device is asked for all rows of keys at once: each call waits for it.
+static void read_at_once(patina_device *device, const char *name)
+{
+    struct stage stage = stage_build(&stagings[19]);
+    patina_settings settings = stage.settings;
+    set_region(&settings, 3, 1, settings.width - 2, settings.height - 1);
+    patina_frame *frame = NULL;
+    CHECK(patina_scene_set_camera(stage.scene, &stage.camera), stage.scene);
+    CHECK(patina_scene_set_settings(stage.scene, &settings), stage.scene);
+    CHECK(patina_frame_create(device, &frame), device);
+    CHECK(patina_frame_render(frame, stage.scene), frame);
+    struct pt_counts before = {0}, after = {0};
+    const uint32_t width = settings.width - 5, height = settings.height - 2;
+    const size_t size = (size_t)width * height * sizeof(uint64_t);
+    uint64_t *keys = malloc(size);
+    assert_non_null(keys);
+    CHECK(device->ops->counts(device, &before), device);
+    CHECK(patina_frame_read_keys(frame, keys, size), frame);
+    CHECK(device->ops->counts(device, &after), device);
+    const uint64_t calls = after.calls - before.calls;
+    printf("  %s: %u rows of keys by %llu calls\n", name, height, (unsigned long long)calls);
+    assert_true(height > 20 && calls < 20);
+    free(keys);
+    patina_frame_destroy(frame);
+    stage_free(&stage);
+}
+
+static void test_keys_are_read_at_once(void **state)
+{
+    (void)state;
+    support_each_device(read_at_once);
+}
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_regions),
         cmocka_unit_test(test_tiles),
+        cmocka_unit_test(test_keys_are_read_at_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -666,7 +666,7 @@ def test_stats_of_opengl():
               for _ in range(2)]
     assert frames[0] == frames[1], frames
     counts = frames[0]
-    assert set(counts) == {"dispatches", "empty", "barriers", "calls", "copies", "waits", "bytes"}, counts
+    assert set(counts) == {"dispatches", "empty", "barriers", "calls", "copies", "waits", "uploaded", "bytes"}, counts
     assert 0 < counts["dispatches"] <= counts["barriers"] <= counts["calls"] and counts["empty"] < counts["dispatches"], counts
     assert counts["waits"] >= 1 and counts["bytes"] > 20000 * 12, counts
 

@@ -740,6 +740,9 @@ PATINA_API int patina_frame_read(const patina_frame *frame, uint32_t pass, float
 // NORMAL, asked for in settings.layer_passes. layer: 1 (nearest) to settings.layers; layers that do not exist read as
 // nothing (0, depth +inf). Like keys they are gone after a render that failed or was cancelled (PATINA_ERROR_EMPTY).
 PATINA_API int patina_frame_read_layer(const patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
+// The nearest depth within two pixels of each pixel: what hides a host's overlays has to be that much wider than the surface. Both are
+// width * height floats, `size` bytes each, and not the same. Any thread.
+PATINA_API int patina_nearest_depths(const float *depths, uint32_t width, uint32_t height, float *nearest, size_t size);
 // The visibility keys of the first layer, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone
 // after a render that failed or was cancelled, and with a cloud that they show (PATINA_ERROR_EMPTY). Scenes of more than 2^32 - 2 points
 // and triangles have numbers that keys do not hold (PATINA_ERROR_TOO_MANY_POINTS): patina_frame_read_numbers.
@@ -768,9 +771,9 @@ PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_st
 // there are soft points, "soft":{"parts":..,"records":..}: in how many parts they are drawn, and how many the largest has room for, at
 // 80 bytes each: peak counts them.
 // "samples":{"grid":..,"shifts":..}: how pixel_samples were taken, pixels on each side of one, times shifted.
-// "gl":{"dispatches":..,"empty":..,"barriers":..,"calls":..,"copies":..,"waits":..,"bytes":..} of an OpenGL device, "cpu":{"barriers":..,
+// "gl":{"dispatches":..,"empty":..,"barriers":..,"calls":..,"copies":..,"waits":..,"uploaded":..,"bytes":..} of an OpenGL device, "cpu":{"barriers":..,
 // "bytes":..} of the processor: what the render asked of it. empty: dispatches without a workgroup; indirect ones count in frames that are
-// measured. copies: between buffers, and into parts of buffers. waits: calls that block until submitted work is done. barriers of the
+// measured. uploaded: bytes that the host hands over. copies: between buffers, and into parts of buffers. waits: calls that block until submitted work is done. barriers of the
 // processor: steps of several threads, each of which ends when all are done. bytes: what the passes read and write by the plan, each of
 // their buffers whole. "work":{"PASS":{..},..}: the same fields for each pass.
 // Returns the full length; truncates to size.
