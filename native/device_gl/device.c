@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "base/color.h"
+#include "base/pool.h"
 #include "device_gl.h"
 #include "shared/colors.h"
 
@@ -574,6 +575,7 @@ static void op_destroy(struct patina_device *device)
     pt_condition_destroy(&d->changed);
     pt_mutex_destroy(&d->lock);
     pt_handle_destroy(&device->handle);
+    pt_pool_destroy(device->pool);
     free(d->queries);
     free(d->host);
     free(d);
@@ -598,7 +600,6 @@ static const struct pt_device_ops ops = {
 int pt_device_gl_create(const patina_device_desc *desc, const char *context, struct patina_device **out)
 {
     static const struct pt_gl_context_ops *const kinds[] = {&pt_gl_context_egl, &pt_gl_context_osmesa, &pt_gl_context_wgl};
-    (void)desc; // threads and batch are the driver's matter
     *out = NULL;
     const struct pt_gl_context_ops *kind = NULL;
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
@@ -618,11 +619,14 @@ int pt_device_gl_create(const patina_device_desc *desc, const char *context, str
     d->base.info.struct_size = sizeof d->base.info;
     d->base.info.threads = 1;
     d->base.copies = 1;
+    d->base.pool = pt_pool_create(desc ? desc->threads : 0,
+                                  desc ? desc->batch : 0); // for plans; NULL: the caller makes them alone
     snprintf(d->base.info.name, sizeof d->base.info.name, "%s", kind->name);
     if (pt_thread_start(&d->thread, thread_main, d, STACK_SIZE)) {
         pt_condition_destroy(&d->changed);
         pt_mutex_destroy(&d->lock);
         pt_handle_destroy(&d->base.handle);
+        pt_pool_destroy(d->base.pool);
         free(d);
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "the thread for OpenGL cannot be started");
     }
