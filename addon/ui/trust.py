@@ -64,8 +64,8 @@ class PATINA_PT_trust(PatinaPanel, Panel):
             rows.sentence(context, layout, f"None of {total:,} points is trusted, so all of them are drawn", 'ERROR')
             return
         out = trust.left_out(cloud, least)
-        rows.sentence(context, layout, f"{out:,} of {total:,} points ({out / max(total, 1):.2%}) are left out. Their bars are red. "
-                                       "Trust is 0 at the left, 1 at the right", 'NONE')
+        said = f"{out:,} of {total:,} points ({out / total:.2%}) are left out. Their bars are red" if out else f"All {total:,} points are drawn"
+        rows.sentence(context, layout, f"{said}. Trust is 0 at the left, 1 at the right", 'NONE')
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_trust,))
