@@ -196,17 +196,24 @@ uint with_strays(ivec2 place, uint white, bool now)
 
 // ---- steps ---------------------------------------------------------------------------------------------------------------------------
 
-uint white_of(ivec2 place, float threshold)
+// Whether all neighbors lie in the square. Other pixels stay as they are: what is beside them is not known.
+bool is_inner(uint cell)
 {
-    ivec2 size = ivec2(args.view.width, args.view.height);
+    ivec2 p = place_of(cell) - corner;
+    return min(p.x, p.y) > 0 && max(p.x, p.y) < int(SIDE) - 1;
+}
+
+// Of an inner cell.
+uint white_of(uint cell, float threshold)
+{
     uint white = 0u;
     for (int d = 0; d < 8; d++)
-        white |= uint(!(z_at(size, place.x + ring[d].x, place.y + ring[d].y) < threshold)) << d;
+        white |= uint(!(pt_float(square_keys[int(cell) + ring[d].y * int(SIDE) + ring[d].x].y) < threshold)) << d;
     return white;
 }
 
 // Whether a pixel is filled, from the state before the step. threshold: what is nearer covers it.
-bool is_open(ivec2 place, uvec2 key, uint source, out float threshold)
+bool is_open(uint cell, ivec2 place, uvec2 key, uint source, out float threshold)
 {
     bool some = key.y != PT_KEY_EMPTY_Z;
     threshold = pt_float(key.y);
@@ -219,7 +226,7 @@ bool is_open(ivec2 place, uvec2 key, uint source, out float threshold)
     if (some)
         return false;
 #endif
-    uint white = white_of(place, threshold);
+    uint white = white_of(cell, threshold);
     if (pt_five_white(white))
         return false;
 #if PHASE == PT_FILL_BACKGROUND
@@ -246,10 +253,10 @@ bool fill_step(uint turn)
     for (uint k = 0u; k < EACH; k++) {
         uint cell = cell_of(k);
         ivec2 place = place_of(cell);
-        if (cell >= CELLS || !in_rect(place))
+        if (cell >= CELLS || !is_inner(cell) || !in_rect(place))
             continue;
         float threshold;
-        if (is_open(place, square_keys[cell], square_from[cell], threshold) &&
+        if (is_open(cell, place, square_keys[cell], square_from[cell], threshold) &&
             close_pixel(args.view, place, threshold, new_keys[k], new_from[k]))
             taken |= 1u << k;
     }
@@ -272,7 +279,7 @@ uint find_entries(out float thresholds[EACH])
         uint cell = cell_of(k);
         ivec2 place = place_of(cell);
         thresholds[k] = pt_float(PT_KEY_EMPTY_Z);
-        if (cell >= CELLS || !in_rect(place) || square_keys[cell].y == PT_KEY_EMPTY_Z)
+        if (cell >= CELLS || !is_inner(cell) || !in_rect(place) || square_keys[cell].y == PT_KEY_EMPTY_Z)
             continue;
         uint pixel = pixel_of(place);
         uvec2 key = kept_keys[pixel];
@@ -295,12 +302,12 @@ bool unfill_step(uint turn, inout uint entries, float thresholds[EACH])
     for (uint k = 0u; k < EACH; k++) {
         if ((entries >> k & 1u) == 0u)
             continue;
-        ivec2 place = place_of(cell_of(k));
-        uint white = white_of(place, thresholds[k]);
+        uint cell = cell_of(k);
+        uint white = white_of(cell, thresholds[k]);
         bool shown = pt_four_white(white);
 #if PHASE == PT_FILL_BACKGROUND
         if (!shown && args.alone != 0u)
-            shown = pt_four_white(with_strays(place, white, false));
+            shown = pt_four_white(with_strays(place_of(cell), white, false));
 #endif
         marked |= uint(shown) << k;
     }
