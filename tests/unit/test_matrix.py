@@ -73,6 +73,13 @@ class Matrix(unittest.TestCase):
             (self.logs / "words").write_text(f"{words}\nDebian, x86_64\n")
             self.assertEqual([[row[name] for name in matrix.SUMS] for row in matrix.of_others()], found)
 
+    def test_the_commit_is_told(self):
+        self.assertEqual(matrix.commit(), "–")
+        (self.logs / "words").write_text("\nDebian, x86_64\n1234abcd+\n")
+        row = self.of(setting() + "1 passed, 0 failed, 0 skipped\n")
+        self.assertIn("| 1234abcd+ |", matrix.table([row | {"commit": matrix.commit()}]))
+        self.assertTrue(matrix.table([row]).endswith("| – |"), "of a result that names none")
+
     def test_pages(self):
         text = f"before\n{matrix.BEGIN}\nold\n{matrix.END}\nafter\n"
         rows = [self.of(setting() + "3 passed, 0 failed, 2 skipped\n")]
