@@ -24,6 +24,7 @@ from .sync import attributes, clips
 SHADINGS = {'WIREFRAME', 'SOLID', 'MATERIAL'}
 NEARER = 1.5  # radii: before Blender's own spheres and dots of the same points
 FILL = 1.2  # of the local spacing, a radius: discs of a random choice leave few gaps
+WIDEST = 3.0  # of the middle radius: strays are no balls
 TINT = 0.15  # of the color that marks selected objects: their dots are hidden
 LIGHT = np.float32((0.3, -0.4, 0.87))  # where from points without colors are lit
 INTENSITIES = ("intensity", "Intensity", "scalar_Intensity", "reflectance")  # whose grays stand in for colors
@@ -46,7 +47,7 @@ class _Drawn:
     part: _Part
     owner: int  # the object's place in memory, of an instance its parent's: whether it is shown in a view
     matrix: object  # mathutils.Matrix
-    cloud: bool  # a PointCloud that its material colors
+    cloud: bool  # a PointCloud that Blender shows and its material colors
 
 
 _parts: dict[tuple[int, str, int], _Part | None] = {}  # by the object's place in memory, the attribute that colors it and the budget
@@ -82,6 +83,7 @@ def thin(obj: bpy.types.Object, budget: int) -> _Part | None:
         return None
     few = places[index]
     radii = np.float32(FILL) * point_data.local_spacing(few)
+    radii = np.minimum(radii, np.float32(WIDEST) * np.median(radii))
     return _Part(np.concatenate([few, radii.reshape(-1, 1)], 1), _colors(obj, count, index, few))
 
 
@@ -129,7 +131,7 @@ def _look_up(depsgraph: bpy.types.Depsgraph, budget: int) -> list[_Drawn]:
         if _parts[key] is None:
             continue
         owner = instance.parent if instance.is_instance else obj
-        cloud = obj.type == 'POINTCLOUD' and any(slot.material for slot in obj.material_slots)
+        cloud = obj.type == 'POINTCLOUD' and point_data.shows_spheres(obj) and any(slot.material for slot in obj.material_slots)
         found.append(_Drawn(_parts[key], owner.original.as_pointer(), instance.matrix_world.copy(), cloud))
     return found
 

@@ -190,6 +190,7 @@ class _Converting:
             if obj.type == 'POINTCLOUD':
                 count = point_data.count_of(obj.data)
                 point_data.add_display_radii(obj.data, attributes.positions(obj.data, count))
+                point_data.spare_spheres(obj)
             else:
                 point_data.drop_display_radii(obj.data)
         self.report({'INFO'}, f"Converted {sum(counts):,} points of {len(objects)} object{'s' * (len(objects) > 1)}")

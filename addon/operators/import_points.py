@@ -152,6 +152,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         _select_none()
         for data, own, units, splats in found:
             obj = bpy.data.objects.new(data.name, data)
+            point_data.spare_spheres(obj)
             self._add(context, obj, own, units)
             if splats:
                 obj.patina.opacity_attribute, obj.patina.radius_attribute = "opacity", "radius"

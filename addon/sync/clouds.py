@@ -339,7 +339,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
             told = ranges.told_of(obj, patina.surface)
             dotted = obj.type == 'MESH' and not solid and not link
-            own_depth = solid or obj.type == 'POINTCLOUD' and not link
+            own_depth = solid or obj.type == 'POINTCLOUD' and not link and point_data.shows_spheres(obj)
             items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted, own_depth, told, analyzed))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()

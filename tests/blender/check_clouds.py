@@ -63,6 +63,32 @@ def test_imports_make_what_is_asked_for():
         bpy.data.objects.remove(obj)
 
 
+def test_many_points_are_shown_as_a_box():
+    """By Blender, which else draws a sphere for each in every redraw. The image is the same; what the artist chose stays."""
+    needs_clouds()
+    new_scene()
+    most, point_data.MOST_SPHERES = point_data.MOST_SPHERES, 199
+    try:
+        for kind, shown in (('AUTO', 'BOUNDS'), ('MESH', 'TEXTURED')):
+            bpy.ops.import_scene.patina_points(filepath=str(written()), kind=kind)
+            obj = bpy.context.object
+            check(obj.display_type == shown, f"{kind}: {obj.display_type}")
+            if kind == 'AUTO':
+                bpy.ops.object.patina_frame_points()
+                boxed = render()
+                obj.display_type = 'TEXTURED'
+                same(boxed, render(), "a box")
+                bpy.data.objects.remove(obj)
+        bpy.ops.object.patina_to_point_cloud()
+        check(obj.type == 'POINTCLOUD' and obj.display_type == 'BOUNDS', f"converted: {obj.display_type}")
+        bpy.ops.object.patina_to_mesh()
+        obj.display_type = 'SOLID'
+        bpy.ops.object.patina_to_point_cloud()
+        check(obj.display_type == 'SOLID', f"the artist's choice became {obj.display_type}")
+    finally:
+        point_data.MOST_SPHERES = most
+
+
 def test_pictures_are_the_same():
     needs_clouds()
     pictures = []

@@ -301,6 +301,17 @@ def test_point_clouds_show_no_dots():
         counts.append((orange_pixels(), dark_pixels()))
     check(points.type == 'POINTCLOUD' and max(dark for _, dark in counts) < LETTERS, f"orange and dark pixels: {counts}")
     check(counts[0][0] < 2000 and counts[1][0] < 8000, f"orange and dark pixels: {counts}")
+    points.select_set(False)
+    for shown in ('TEXTURED', 'BOUNDS'):  # as a box Blender draws no depth of the points: they hide what lies within all the same
+        points.display_type = shown
+        hidden = []
+        for size in (0.01, 0.3):
+            empty.empty_display_size = size
+            empty.select_set(True)
+            area().tag_redraw()
+            yield at_rest()
+            hidden.append(orange_pixels())
+        check(abs(hidden[1] - hidden[0]) < 60, f"{shown}: orange pixels of a small and a large empty within: {hidden}")
     bpy.data.objects.remove(empty)
     do(bpy.ops.ed.undo)
     points = bpy.data.objects[name]
