@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of points on the command line: tests that test_cli.py, the script that runs, takes in."""
+"""Files of points on the command line: tests that test_cli.py runs."""
 
 import os
 import random
@@ -7,7 +7,7 @@ import struct
 import subprocess
 import time
 
-import __main__ as cli
+import cli
 
 
 def test_tables_of_spreadsheets():

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Range images and scans on the command line: tests that test_cli.py, the script that runs, takes in."""
+"""Range images and scans on the command line: tests that test_cli.py runs."""
 
 import json
 import re
 
-import __main__ as cli
+import cli
 
 
 def test_info_of_saved_scans():

@@ -4,7 +4,7 @@
 import json
 import random
 
-import __main__ as cli
+import cli
 
 VIEW = ("--size", "64x64", "--smooth", "off", "--antialias", "off", "--fill", "off", "--unlit")
 
