@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 import os
 import struct
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from . import readers
+from . import readers, whole
 from .importers.scans import Scan
 
 # The packages that each format needs, by the extension of its files.
@@ -48,12 +47,14 @@ def write(path: Path, points: Points, gps_time_start: float = 0.0) -> list[str]:
     if missing:
         raise ExportError(f"'{path.name}': {extension.upper()} needs the Python package {' and '.join(missing)}. "
                           "Use Install Readers in the add-on's preferences")
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".patina-export-") as folder:
-        part = Path(folder) / f"points.{extension}"
+    with whole.Folder(".patina-export-", path.parent) as folder:
+        part = folder / f"points.{extension}"
         try:
             left = _WRITERS[extension](part, points, gps_time_start)
-        except RuntimeError as error:  # of libE57 and lazrs, a full disk for example
-            raise ExportError(f"'{path.name}' cannot be written: {error}") from None
+        except (ExportError, OSError, MemoryError):
+            raise
+        except Exception as error:  # of libE57 and lazrs, each has its own kind: a full disk for example
+            raise ExportError(f"'{path.name}' cannot be written: {str(error).strip().partition(chr(10))[0]}") from None
         os.replace(part, path)
     return left
 

@@ -17,6 +17,8 @@ import sys
 from collections.abc import Generator, Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
+from . import whole
+
 BROUGHT = "3.10 to 3.14"  # Pythons that the zip's lazrs is compiled for
 COMPILED = {"lazrs": "lazrs", "pye57": "libe57"}  # their modules that are compiled for one Python
 
@@ -113,18 +115,17 @@ def look_no_more_in(folder: Path) -> None:
 def install(wheels: Iterable[Path], folder: Path) -> Iterator[str]:
     """Unpacks wheels into the folder, in place of what is there of theirs; says before each what it does. ReadersError, and the
     folder is as it was, when one is none, is for another Python or system, or cannot be written."""
-    import tempfile
     wheels = sorted(wheels)
     for wheel in wheels:
         _check(wheel)
     folder.parent.mkdir(parents=True, exist_ok=True)
     try:
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".readers-") as place:
+        with whole.Folder(".readers-", folder.parent) as place:
             for wheel in wheels:
                 yield f"Unpacking {wheel.name}"
-                _unpack(wheel, Path(place))
+                _unpack(wheel, place)
             folder.mkdir(exist_ok=True)
-            for item in Path(place).iterdir():
+            for item in place.iterdir():
                 _replace(item, folder / item.name)
     except OSError as error:
         raise ReadersError(f"{folder}: {error.strerror or error}") from None

@@ -27,6 +27,7 @@ never touched, nor is a property that is animated or driven. A picture of the sa
 from __future__ import annotations
 
 import json
+import stat
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -38,7 +39,7 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from . import point_data
+from . import point_data, whole
 
 VERSION = 1
 PLAIN = "scan"  # the style of defaults
@@ -130,31 +131,42 @@ def _entry(path: Path, _changed: int) -> Entry:
     """A file that is no style is listed by its name, and says why when it is chosen."""
     try:
         found = _parse(path)
-        return Entry(path.stem, path, _text(found.get("name")) or bpy.path.display_name(path.stem), _text(found.get("about")))
+        return Entry(path.stem, path, _text(found.get("name")) or bpy.path.display_name(path.stem), _text(found.get("about"), 2000))
     except StyleError as error:
         return Entry(path.stem, path, path.stem, str(error))
 
 
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else ""
+def _text(value: Any, most: int = 100) -> str:
+    """A text of a file as Blender shows it: on one line, without control characters, and not longer than an artist reads."""
+    text = value if isinstance(value, str) else ""
+    return "".join(letter if letter.isprintable() else " " for letter in text[:most]).strip()
+
+
+def _shown(value: Any) -> str:
+    """A value of a file in a message."""
+    text = json.dumps(value)
+    return text if len(text) <= 80 else f"{text[:80]}..."
 
 
 def _parse(path: Path) -> dict[str, Any]:
     try:
-        if path.stat().st_size > LARGEST:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise StyleError(f"{path.name} is a folder, device or pipe, not a file")
+        if status.st_size > LARGEST:
             raise StyleError(f"{path.name} is larger than any style")
         found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise StyleError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise StyleError(f"{path.name} is no text in UTF-8") from None
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # numbers of thousands of digits, too
         where = f", line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise StyleError(f"{path.name}{where}: no valid JSON") from None
     if not isinstance(found, dict) or "patina_style" not in found:
         raise StyleError(f"{path.name} is no style: it has no key 'patina_style'")
     if found["patina_style"] != VERSION:
-        raise StyleError(f"{path.name} is a style of version {found['patina_style']}, this Patina reads {VERSION}")
+        raise StyleError(f"{path.name} is a style of version {_shown(found['patina_style'])}, this Patina reads {VERSION}")
     return found
 
 
@@ -173,13 +185,14 @@ def read(path: Path) -> Style:
             try:
                 values[section][key] = _from_file(known[key], raw)
             except ValueError as error:
-                raise StyleError(f"{path.name}: {section}.{key} is {json.dumps(raw)}; {error} was expected") from None
+                raise StyleError(f"{path.name}: {section}.{key} is {_shown(raw)}; {error} was expected") from None
     view = dict(_section(path, found, "view"))
     transform = view.pop("transform", "")
     if not isinstance(transform, str):
-        raise StyleError(f"{path.name}: view.transform is {json.dumps(transform)}; a name was expected")
+        raise StyleError(f"{path.name}: view.transform is {_shown(transform)}; a name was expected")
     unknown += [f"view.{key}" for key in view]
-    return Style(_text(found.get("name")) or bpy.path.display_name(path.stem), _text(found.get("about")), values["scene"],
+    unknown = [_shown(key)[1:-1] for key in unknown]
+    return Style(_text(found.get("name")) or bpy.path.display_name(path.stem), _text(found.get("about"), 2000), values["scene"],
                  values["points"], transform, tuple(unknown))
 
 
@@ -202,7 +215,7 @@ def write(path: Path, style: Style) -> None:
             keys = [f'        "{key}": {json.dumps(_to_file(known.get(key), value))}' for key, value in section.items()]
             lines.append(f'    "{name}": {{\n' + ",\n".join(keys) + "\n    }")
     try:
-        path.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+        whole.write(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
     except OSError as error:
         raise StyleError(f"{path}: {error.strerror}") from None
 

@@ -5,7 +5,6 @@
 Frames, tiles and parts are arrays; what must wait (parts for what is converted, merging for all of them, a round for the one before) depends on what it waits for.
 A task on a node that fails is run again by Slurm; one that was killed puts itself in the queue again, twice at most. Merging begins when all tasks have ended, well or not, and names
 what is missing. --dry writes the scripts alone. Python's own library only."""
-import json
 import shlex
 import subprocess
 import sys
@@ -58,7 +57,13 @@ def main() -> int:
     options = sys.argv[1:]
     dry = "--dry" in options
     options = [option for option in options if option != "--dry"]
-    job = json.loads((FOLDER / "job.json").read_text("utf-8"))
+    sys.dont_write_bytecode = True
+    import task
+    try:
+        job = task.read_job()
+    except task.Wrong as error:
+        print(f"patina job: {error}", file=sys.stderr)
+        return 1
     (FOLDER / "logs").mkdir(exist_ok=True)
     (FOLDER / "slurm").mkdir(exist_ok=True)
     before = ""

@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 import socket
+import stat
 import subprocess
 import sys
 import time
@@ -17,6 +18,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
 ENDS = 1 << 20  # bytes at either end of a file that tell whether it is the job's
+LARGEST = 64 << 20  # bytes of a job.json
 AGAIN = 3  # patina merge: another round is wanted
 WRONG = 1
 
@@ -37,15 +39,49 @@ def look_of(path: Path) -> list:
 
 
 def read_job() -> dict:
+    path = FOLDER / "job.json"
     try:
-        job = json.loads((FOLDER / "job.json").read_text("utf-8"))
+        if not stat.S_ISREG(path.stat().st_mode) or path.stat().st_size > LARGEST:
+            raise Wrong(f"{path} is no file, or larger than any job")
+        job = json.loads(path.read_text("utf-8"))
     except OSError as error:
         raise Wrong(f"{FOLDER}/job.json cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise Wrong(f"{FOLDER}/job.json is damaged: {error}") from error
-    if job.get("patina_job") != 1:
+    except RecursionError:
+        raise Wrong(f"{FOLDER}/job.json is damaged: its lists are too deep") from None
+    if not isinstance(job, dict) or job.get("patina_job") != 1:
         raise Wrong(f"{FOLDER}/job.json is of another version")
+    lacking = lacks(job)
+    if lacking:
+        raise Wrong(f"{FOLDER}/job.json is damaged: '{lacking}' is missing, or not what it should be")
     return job
+
+
+def texts(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(text, str) and "\0" not in text for text in value)
+
+
+def numbers(value: object) -> bool:
+    return isinstance(value, list) and all(type(number) is int for number in value)
+
+
+def lacks(job: dict) -> str:
+    """The first key of a job that is missing, or of another type; "" where none is."""
+    for key in ("kind", "name", "by", "program", "version", "directory", "output"):
+        if not texts([job.get(key)]) or not job[key] and key not in ("name", "version"):
+            return key
+    kinds = {"frames": lambda value: numbers(value) and all(0 <= number < 1 << 31 for number in value),
+             "tiles": lambda value: numbers(value) and len(value) == 2 and min(value) > 0 and max(value) < 1 << 16,
+             "parts": lambda value: type(value) is int and 0 < value < 1 << 16}
+    if job["kind"] not in kinds or job["by"] not in ("patina", "blender"):
+        return "kind" if job["kind"] not in kinds else "by"
+    checks = {job["kind"]: kinds[job["kind"]], "rounds": lambda value: type(value) is int and 0 < value < 1 << 16, "arguments": texts,
+              "files": lambda value: isinstance(value, dict) and texts(list(value)),
+              "convert": lambda value: isinstance(value, list) and all(texts(pair) and len(pair) == 2 for pair in value)}
+    if job["kind"] == "frames" and job["by"] == "patina":
+        checks["options"] = lambda value: isinstance(value, list) and len(value) == len(job["frames"]) and all(map(texts, value))
+    return next((key for key, good in checks.items() if not good(job.get(key, [] if key == "convert" else None))), "")
 
 
 def program_of(job: dict) -> str:

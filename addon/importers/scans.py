@@ -39,9 +39,9 @@ def unpacked(text: object) -> list[Scan]:
     try:
         found = [Scan(str(item["name"]), int(item["count"]), tuple(map(float, item["direction"])), float(item["interval"]),
                       tuple(map(float, item.get("pose", HERE))), tuple(map(int, item.get("grid", (0, 0))))) for item in json.loads(text)]
-    except (TypeError, ValueError, KeyError, AttributeError):
+    except (TypeError, ValueError, KeyError, AttributeError, OverflowError, RecursionError):
         return []
-    return found if all(len(scan.direction) == 3 and len(scan.pose) == 12 and len(scan.grid) == 2 for scan in found) else []
+    return found if all(scan.count >= 0 and len(scan.direction) == 3 and len(scan.pose) == 12 and len(scan.grid) == 2 for scan in found) else []
 
 
 def note(scans: Sequence[Scan]) -> dict[str, str]:

@@ -11,7 +11,6 @@ import contextlib
 import json
 import os
 import subprocess
-import tempfile
 import threading
 import time
 import weakref
@@ -21,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import jobs, memory, native, programs
+from .. import jobs, memory, native, programs, whole
 
 MOST_TASKS = 24  # pages that are handed in at once: where drawing is slow, Blender looks but a few times a second
 ROOM = 4096  # pages that are asked for at once
@@ -63,8 +62,11 @@ class Stream:
         self.arrived = 0  # pages so far
         self.has_scalar = False
         self._lock = threading.RLock()  # a final picture's thread, and Blender's
-        self._folder = tempfile.TemporaryDirectory(prefix="patina-pages-", ignore_cleanup_errors=True)
-        self._place = Path(self._folder.name)
+        try:
+            self._folder = whole.Folder("patina-pages-")
+        except OSError as error:
+            raise native.PatinaError(f"{place}: the folder for temporary files cannot be written: {error.strerror}", -3) from None
+        self._place = self._folder.path
         self._asked: dict[int, None] = {}  # pages in the order of their being wanted
         self._tasks: list[tuple[int, native.Task]] = []
         self._bad: set[int] = set()
@@ -73,7 +75,7 @@ class Stream:
         self._returned = self._seen = 0
         self._here: set[int] = set()
         try:
-            self._process = subprocess.Popen([*programs.command(Path(__file__).with_name("reader.py")), self._folder.name],
+            self._process = subprocess.Popen([*programs.command(Path(__file__).with_name("reader.py")), str(self._place)],
                                              stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         except OSError as error:
             raise native.PatinaError(f"{place}: the reading process does not start: {error.strerror}", -3) from None
@@ -245,7 +247,7 @@ class Stream:
             self._process.stdin.flush()
 
 
-def _finish(process: subprocess.Popen, folder: tempfile.TemporaryDirectory) -> None:
+def _finish(process: subprocess.Popen, folder: whole.Folder) -> None:
     with contextlib.suppress(OSError):
         process.stdin.close()
     try:

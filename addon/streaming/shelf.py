@@ -121,7 +121,7 @@ def about(own: Path) -> dict[str, Any] | None:
     try:
         told = json.loads((own / ABOUT).read_text("utf-8"))
         found = {name: told[name] for name in ("version", "total", "etag", "modified", "head")}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
     texts = [value for name, value in found.items() if name != "total"]
     right = all(isinstance(text, str) for text in texts) and _VERSION.fullmatch(found["version"]) is not None and isinstance(found["total"], (int, type(None)))

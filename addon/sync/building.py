@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from pathlib import Path
 from typing import BinaryIO
@@ -12,6 +11,7 @@ import numpy as np
 
 from .. import importers, jobs, memory, native, preferences
 from ..native.building import Builder
+from ..whole import writing
 from . import attributes
 from .scans_of import MOST_SCANS, SCAN_ENDING, SCAN_NAMES, Scans, places_of, whole
 
@@ -116,14 +116,12 @@ class _Scans:
         numbers = np.flatnonzero(self._counts)
         if not self._file or not 1 < len(numbers) <= MOST_SCANS:
             return None
-        places, part = places_of(numbers), self._place.with_suffix(f".{os.getpid()}.part")
+        places = places_of(numbers)
         self._file.seek(0)
         try:
-            with open(part, "wb") as out:
+            with writing(self._place.with_suffix(SCAN_ENDING)) as out:
                 while data := self._file.read(1 << 22):
                     out.write(places[np.frombuffer(data, np.uint16)].tobytes())
-            os.replace(part, self._place.with_suffix(SCAN_ENDING))
         except OSError as error:
-            part.unlink(missing_ok=True)
             raise native.PatinaError(f"{self._place}: cannot be written: {error.strerror}", native.FILE) from None
         return Scans(self._name, tuple(numbers.tolist()))

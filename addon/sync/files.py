@@ -17,6 +17,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from .. import whole
 from ..importers.reading import told
 from ..streaming.address import is_ept
 from . import addresses, kept, sequence
@@ -82,12 +83,20 @@ def _put_down(packed: bpy.types.PackedFile, path: Path) -> Path:
     if known is None or not known.is_file():
         data = packed.data
         name = hashlib.blake2b(data, digest_size=12).hexdigest()
-        known = kept.folder() / f"{name}-packed{path.suffix}"
-        if not known.is_file():
-            known.write_bytes(data)
-            os.utime(known, (0, 0))  # what is made of it is good for every copy
+        try:
+            known = _written(kept.folder() / f"{name}-packed{path.suffix}", data)
+        except OSError:  # a cache that is full, or gone
+            known = _written(kept.temporary_folder() / f"{name}-packed{path.suffix}", data)
         _unpacked[key] = known
     return known
+
+
+def _written(path: Path, data: bytes) -> Path:
+    """The file, whole: half of it may be there, or it was damaged since."""
+    if not path.is_file() or path.stat().st_size != len(data) or path.read_bytes() != data:
+        whole.write(path, data)
+        os.utime(path, (0, 0))  # what is made of it is good for every copy
+    return path
 
 
 def text_of(obj: bpy.types.Object) -> str:

@@ -12,13 +12,14 @@ import os
 import re
 import threading
 import time
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from .. import jobs, native, preferences
+from .. import jobs, native, preferences, whole
 
 # Of what is kept of a scan: its place, its state then, what was asked for; and of packed files that were put down, their sum. Nothing else in the
 # folder, which may be one of the artist's, is ours.
@@ -40,7 +41,8 @@ def folder() -> Path:
     known = preferences.get()
     if known and known.cache_folder:
         chosen = Path(bpy.path.abspath(known.cache_folder))
-        chosen.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(OSError):  # its disk is gone: clouds stay in memory, as where it is full
+            chosen.mkdir(parents=True, exist_ok=True)
         return chosen
     own = bpy.utils.user_resource('DATAFILES', path="patina")
     with contextlib.suppress(OSError):  # where Blender is asked to make it, it prints a traceback
@@ -48,6 +50,11 @@ def folder() -> Path:
             Path(own).mkdir(parents=True, exist_ok=True)
             if os.access(own, os.W_OK):
                 return Path(own)
+    return temporary_folder()
+
+
+def temporary_folder() -> Path:
+    """This user's own among the system's for temporary files. OSError, PermissionError where somebody else has its name."""
     import tempfile  # which few come to, at Blender's start nobody
     user = getattr(os, "getuid", lambda: "")()
     beside = Path(tempfile.gettempdir()) / f"patina-{user}"
@@ -73,9 +80,16 @@ def place_of(path: Path, name: str) -> Path:
 
 def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], list[float], dict[str, Any] | None, str]:
     """Origin, scanners, units, scans and what is told of these, of a kept cloud. ValueError or OSError where they are not there as they were written."""
-    notes = json.loads(path.read_text("utf-8"))
+    try:
+        notes = json.loads(path.read_text("utf-8"))
+    except RecursionError:
+        raise ValueError(f"{path} is damaged") from None
     if not isinstance(notes, dict):
         raise ValueError(f"{path} holds no object")
+    if notes.pop("sum", None) not in {None, _sum_of_notes(notes)}:  # None: of an older version
+        raise ValueError(f"{path} is damaged")
+    if notes.get("unsure"):
+        raise ValueError(f"{path} is of a file that may have changed since, at the same second")
     origin, scanners = _numbers(notes.get("origin")), _numbers(notes.get("scanners") or [])
     units = _numbers(notes.get("units") or [1.0, 1.0])
     if len(origin) != 3 or len(scanners) % 3 or len(units) != 2:
@@ -87,6 +101,45 @@ def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], lis
     if not isinstance(told, str):
         raise ValueError(f"{path} does not tell of its scans")
     return tuple(origin), scanners, units, scans, told
+
+
+def write_notes(path: Path, notes: dict[str, Any], scan_file: Path | None) -> None:
+    """With check sums, of the file too that says of which scan each point is. OSError."""
+    notes = json.loads(json.dumps(notes)) | ({"scan_sum": _sum_of_file(scan_file)} if scan_file else {})
+    whole.write(path, json.dumps(notes | {"sum": _sum_of_notes(notes)}).encode())
+
+
+def check_scan_file(path: Path, scan_file: Path, count: int) -> None:
+    """Whether that file is the one that the notes in `path` were written with. ValueError where not, OSError."""
+    wanted = json.loads(path.read_text("utf-8")).get("scan_sum")
+    if scan_file.stat().st_size != 2 * count or wanted not in {None, _sum_of_file(scan_file)}:  # None: of an older version
+        raise ValueError(f"{scan_file} is damaged")
+
+
+def _sum_of_notes(notes: dict[str, Any]) -> int:
+    return zlib.crc32(json.dumps(notes, sort_keys=True).encode())
+
+
+def _sum_of_file(path: Path) -> int:
+    found = 0
+    with open(path, "rb") as file:
+        while data := file.read(1 << 22):
+            found = zlib.crc32(data, found)
+    return found
+
+
+def is_unsure(path: Path) -> bool:
+    """Whether a file may change now without another time: it has times of whole seconds, and was written just now."""
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError:
+        return False
+    return changed % 1_000_000_000 == 0 and abs(time.time() - changed / 1e9) <= 2.0
+
+
+def remove_left(place: Path) -> None:
+    """What processes that were killed left half-written."""
+    whole.remove_left(place, lambda path: is_of_scan(path) or is_packed(path))
 
 
 def _numbers(values: Any) -> list[float]:

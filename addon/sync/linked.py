@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import math
 import os
 import shutil
@@ -19,7 +18,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .. import importers, jobs, native, preferences, streaming
+from .. import importers, jobs, native, preferences, streaming, whole
 from ..importers import crs, saved
 from ..importers import scans as scans_of_files
 from ..importers.origin import PROPERTY, TOGETHER, ZERO
@@ -164,10 +163,10 @@ def share(source: Source) -> bool:
     try:
         target.mkdir(exist_ok=True)
         for path in names:
-            part = target / f"{path.name}.{os.getpid()}.part"
             if path.is_file() and not (target / path.name).is_file():
-                shutil.copyfile(path, part)
-                os.replace(part, target / path.name)
+                with open(path, "rb") as found, whole.writing(target / path.name) as file:
+                    shutil.copyfileobj(found, file, 1 << 22)
+        kept.remove_left(target)
     except OSError:
         return False
     return True
@@ -202,10 +201,11 @@ def _is_outdated(cloud: native.Cloud, source: Source) -> bool:
 
 def _make(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """Builds, analyzes and keeps the cloud of a file."""
+    unsure = kept.is_unsure(source.path)
     pieces = yield from importers.in_pieces(source.path, building.LARGE, building.names_of(source.scalar), progress)
     if pieces:
         try:
-            return (yield from _build(source, pieces, progress))
+            return (yield from _build(source, pieces, progress, unsure))
         except (native.PatinaError, OSError) as error:
             code = getattr(error, "code", native.FILE)
             found = _opened(source) if code == native.FILE else None
@@ -244,8 +244,8 @@ def _make(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         yield task
         task.result()
         if scans:
-            scan_of.tofile(source.kept.with_suffix(SCAN_ENDING))
-        _write_notes(source.kept, origin, scanners, units, scans, told)
+            whole.write(source.kept.with_suffix(SCAN_ENDING), scan_of.tobytes())
+        _write_notes(source.kept, origin, scanners, units, scans, told, unsure)
         _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's
     except (native.PatinaError, OSError):
@@ -289,8 +289,8 @@ def _opened(source: Source) -> Linked | None:
     """The kept cloud; None where it is not there yet, of another version, or damaged: it is made anew then."""
     try:
         found = _linked(native.Cloud.open(source.kept), *kept.read_notes(source.kept.with_suffix(".json")), source.kept)
-        if found.scans and found.cloud.scan_file.stat().st_size != 2 * found.cloud.count:
-            raise ValueError("the list of scans is damaged")
+        if found.scans:
+            kept.check_scan_file(source.kept.with_suffix(".json"), found.cloud.scan_file, found.cloud.count)
         with contextlib.suppress(OSError):  # of another user
             os.utime(source.kept)  # used just now
         kept.CHECKS.start(source.identity(), source.kept)
@@ -307,12 +307,14 @@ def _forget_older(source: Source) -> None:
             old.unlink()
 
 
-def _write_notes(place: Path, origin: Corner, scanners: list[float], units: list[float] | None, scans: Scans | None, told: str) -> None:
-    place.with_suffix(".json").write_text(json.dumps(
-        {"origin": origin, "scanners": scanners, "units": units, "scans": scans and asdict(scans), "told": told}), "utf-8")
+def _write_notes(place: Path, origin: Corner, scanners: list[float], units: list[float] | None, scans: Scans | dict | None, told: str,
+                 unsure: bool) -> None:
+    scans = asdict(scans) if isinstance(scans, Scans) else scans
+    kept.write_notes(place.with_suffix(".json"), {"origin": origin, "scanners": scanners, "units": units, "scans": scans, "told": told} |
+                     ({"unsure": True} if unsure else {}), place.with_suffix(SCAN_ENDING) if scans else None)
 
 
-def _build(source: Source, pieces: importers.Pieces, progress: importers.Progress) -> jobs.Steps[Linked]:
+def _build(source: Source, pieces: importers.Pieces, progress: importers.Progress, unsure: bool) -> jobs.Steps[Linked]:
     """A large file's cloud: built on the disk without an analysis, kept so, and then analyzed. Whoever was killed between the two
     goes on from there."""
     parts = 3 if source.analyzed else 2
@@ -327,12 +329,12 @@ def _build(source: Source, pieces: importers.Pieces, progress: importers.Progres
         scans = yield from building.steps(pieces, bare.kept, source.scalar, offset, source.hide_uncolored, progress, parts)
         units, told = pieces.notes.get("units"), pieces.notes.get(scans_of_files.NOTE, "")
         scanners = [value + offset[i % 3] for i, value in enumerate(pieces.notes.get("scanners", ()))]
-        _write_notes(bare.kept, origin, scanners, units, scans, told)
+        _write_notes(bare.kept, origin, scanners, units, scans, told, unsure)
         _tidy(bare.kept)
         found = _linked(native.Cloud.open(bare.kept), origin, scanners, units, scans and asdict(scans), told, bare.kept)
     if not source.analyzed:
         return found
-    return (yield from _analyze(source, bare, found, made, progress.part(2, parts)))
+    return (yield from _analyze(source, bare, found, made, progress.part(2, parts), unsure))
 
 
 def _bare(wanted: Source) -> Source:
@@ -343,7 +345,8 @@ def _bare(wanted: Source) -> Source:
     return found
 
 
-def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: importers.Progress) -> jobs.Steps[Linked]:
+def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: importers.Progress,
+             unsure: bool) -> jobs.Steps[Linked]:
     """Analyzes what was built, on the disk too; lets the cloud without go where nobody else asked for it."""
     units = None if found.units == (1.0, 1.0) else list(found.units)
     notes = (found.origin, found.scanners, units, found.scans, found.told)
@@ -352,7 +355,7 @@ def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: 
     stations = analysis.of_columns(found.scanners, _scan_of(found))
     try:
         yield from analyzing.on_disk(found.cloud, stations, bare.kept, source.kept, progress)
-        _write_notes(source.kept, *notes)
+        _write_notes(source.kept, *notes, unsure)
         known = _linked(native.Cloud.open(source.kept), *notes[:3], found.scans and asdict(found.scans), found.told, source.kept)
     except (native.PatinaError, OSError) as error:
         if getattr(error, "code", native.FILE) == native.TOO_MANY_POINTS:
@@ -405,7 +408,8 @@ def _stream(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
 
 
 def _tidy(newest: Path) -> None:
-    """Lets the clouds go that were not used for longest, where all together are too large."""
+    """Lets the clouds go that were not used for longest, where all together are too large, and what was never finished."""
+    kept.remove_left(newest.parent)
     clouds = []
     for path in filter(kept.is_of_scan, newest.parent.glob("*.cloud")):
         with contextlib.suppress(OSError):  # another Blender lets it go just now

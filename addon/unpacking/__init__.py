@@ -15,13 +15,12 @@ import os
 import select
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from .. import native, programs
+from .. import native, programs, whole
 
 SLOTS = 3  # one is written, one waits, one is read
 SLOT = 64 << 20  # bytes at most
@@ -37,16 +36,19 @@ class Unpacker:
         """slot: bytes of one answer. memory: bytes that the process may take beside LEAST_MEMORY. order: what the kind needs.
         PatinaError when the process does not start."""
         self._path, self._size, self._limit = path, max(slot, 1), LEAST_MEMORY + memory
-        self._folder = tempfile.TemporaryDirectory(prefix="patina-unpack-", ignore_cleanup_errors=True)
+        try:
+            self._folder = whole.Folder("patina-unpack-")
+        except OSError as error:
+            raise self._fail(f"the folder for temporary files cannot be written: {error.strerror}", -3) from None
         self._process: subprocess.Popen[bytes] | None = None
         self._map: mmap.mmap | None = None
         self._text = b""
         self._asked = time.monotonic()
         try:
-            self._map = self._slots(Path(self._folder.name) / "slots")
+            self._map = self._slots(self._folder.path / "slots")
             here = Path(__file__).parent
             self._process = subprocess.Popen(
-                [*programs.command(here / "main.py"), str(Path(self._folder.name) / "slots")],
+                [*programs.command(here / "main.py"), str(self._folder.path / "slots")],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
         except OSError as error:
             self.close()

@@ -1,6 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A cloud's file that is cut short while it is mapped, at any time: what is left is drawn, one line names the file, calls that would
 // work with the missing points fail, and nothing ends the process. The host's own handler of such faults still works.
+#ifdef _WIN32
+#include <stdio.h>
+
+int main(void)
+{
+    printf("skip: Windows cuts no mapped file short; tests/unit/test_cli.py does it from outside, where wine runs the program\n"
+           "0 passed, 0 failed, 1 skipped\n");
+    return 0;
+}
+#else
 #include "clouds.h"
 #include "support.h"
 
@@ -449,3 +459,4 @@ int main(int argc, char **argv)
     };
     return cmocka_run_group_tests(tests, make_file, remove_files);
 }
+#endif
