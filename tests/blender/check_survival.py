@@ -9,7 +9,6 @@ import shutil
 import sys
 import time
 from contextlib import contextmanager
-from pathlib import Path
 from unittest import mock
 
 import bpy
@@ -20,9 +19,9 @@ from check_import import import_ply
 from check_kept import forget
 from check_linked import dense
 from check_preferences import enabled
-from harness import SCRATCH, Skip, check, new_scene, patina, render
+from harness import SCRATCH, Skip, check, new_scene, render
 from patina import importers, styles
-from patina.sync import edits, files, kept, linked
+from patina.sync import edits, files, linked
 
 
 @contextmanager

@@ -5,28 +5,21 @@ Needs no Blender:
     PATINA_LIBRARY=... PYTHONPATH=(laspy, lazrs, pye57) python tests/files/test_hostile.py [NAME ...]
 """
 
-import importlib
 import os
 import random
 import resource
 import struct
-import sys
 import tempfile
 import time
-import types
 from pathlib import Path
 
 import numpy as np
+from patina_modules import ROOT, imported
 from runner import Skip, run_tests
 
-ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared/data"
-for _name, _place in (("patina", "addon"), ("patina.importers", "addon/importers")):  # whose __init__ need Blender
-    sys.modules[_name] = types.ModuleType(_name)
-    sys.modules[_name].__path__ = [str(ROOT / _place)]
-las, e57, pcd, library, reading, unpacking, readers, native, e57_xml = (importlib.import_module(f"patina.{name}") for name in (
-    "importers.las", "importers.e57", "importers.pcd", "importers.library", "importers.reading", "unpacking", "readers", "native",
-    "unpacking.e57_xml"))
+las, e57, pcd, library, reading, unpacking, readers, native, e57_xml = imported(
+    "importers.las", "importers.e57", "importers.pcd", "importers.library", "importers.reading", "unpacking", "readers", "native", "unpacking.e57_xml")
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-hostile-"))
 READERS = {".las": las, ".laz": las, ".e57": e57, ".pcd": pcd}
 
