@@ -12,6 +12,7 @@ sys.dont_write_bytecode = True
 sys.path.append(str(Path(__file__).resolve().parents[2] / "build"))
 import cli  # noqa: E402
 import cli_analysis  # noqa: E402
+import cli_borders  # noqa: E402
 import cli_files  # noqa: E402
 import cli_numbers  # noqa: E402
 import cli_pictures  # noqa: E402
@@ -22,7 +23,7 @@ import cli_usage  # noqa: E402
 
 def main():
     passed, failed = 0, 0
-    modules = (cli_analysis, cli_usage, cli_pictures, cli_numbers, cli_files, cli_ranges, cli_trust)
+    modules = (cli_analysis, cli_usage, cli_pictures, cli_borders, cli_numbers, cli_files, cli_ranges, cli_trust)
     tests = [(name, test) for module in modules for name, test in vars(module).items() if name.startswith("test_")]
     wanted = sys.argv[2:]
     with tempfile.TemporaryDirectory() as folder:
