@@ -14,6 +14,17 @@ def _red(color):
     return int(((color[..., 3] > 0) & (color[..., 0] > color[..., 1])).sum())
 
 
+def _shows_data():
+    """Whether the properties editor shows the object's data. It offers them once it has drawn the active object."""
+    properties = next(area for area in bpy.context.window.screen.areas if area.type == 'PROPERTIES')
+    properties.tag_redraw()
+    try:
+        properties.spaces[0].context = 'DATA'
+    except TypeError:
+        return False
+    return True
+
+
 def test_trust_is_live():
     """Strays come and go with the slider; nothing is analyzed or built again. The panel's histogram and figures follow, and the screen shows
     what the image has."""
@@ -28,8 +39,7 @@ def test_trust_is_live():
         bpy.ops.object.patina_to_point_cloud()
         obj = bpy.context.view_layer.objects.active
         obj.patina.lighting = 'UNLIT'
-    properties = next(area for area in bpy.context.window.screen.areas if area.type == 'PROPERTIES')
-    properties.spaces[0].context = 'DATA'
+    yield _shows_data
     yield lambda: settled(BALL + STRAYS) and shown().shown.clouds[0].cloud.has_shapes
     found = shown()
     built = found.shown.clouds[0].cloud
