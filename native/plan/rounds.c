@@ -88,6 +88,12 @@ static uint32_t bytes_of(const struct pt_chunk_list *list, uint32_t arrays)
     return bytes;
 }
 
+void pt_list_count_bytes(struct pt_chunk_list *list)
+{
+    list->each[0] = bytes_of(list, list->arrays & ~list->culled);
+    list->each[1] = bytes_of(list, list->arrays);
+}
+
 uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, struct pt_chunk_list *lists)
 {
     uint32_t count = 0;
@@ -116,8 +122,7 @@ uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, s
             count--;
             continue;
         }
-        list->each[0] = bytes_of(list, list->arrays & ~list->culled);
-        list->each[1] = bytes_of(list, list->arrays);
+        pt_list_count_bytes(list);
     }
     return count;
 }

@@ -44,6 +44,7 @@ int pt_pass_marks(const struct pt_pass *pass);
 static inline int pt_is_of_parts(const struct pt_pass *pass) { return pt_pass_role(pass) >= PT_ROLE_KEYS; }
 // The lists of a pass, all their chunks; lists: room for as many as the pass has references. Returns how many.
 uint32_t pt_pass_lists(const struct pt_plan *plan, const struct pt_pass *pass, struct pt_chunk_list *lists);
+void pt_list_count_bytes(struct pt_chunk_list *list); // computes `each` from the arrays
 static inline uint64_t pt_chunk_bytes(const struct pt_chunk_list *list, const struct chunk_view *chunk)
 {
     return (uint64_t)chunk->padded * list->each[chunk->cull != 0];

@@ -247,6 +247,7 @@ int pt_pager_open(struct pt_pager *pager, struct patina_device *device, const st
 
 void pt_pager_close(struct pt_pager *pager)
 {
+    pt_sieves_free(&pager->sieves);
     if (pager->device->copies) {
         pager->read += pager->device->ranges.read;
         pager->rounds = pager->device->ranges.rounds > pager->rounds ? pager->device->ranges.rounds : pager->rounds;
@@ -317,6 +318,7 @@ static void expect(const struct pt_chunk_list *lists, uint32_t count, const stru
 
 struct bound {
     const struct pt_chunk_list *lists, *all; // all: before chunks without a mark were left out
+    struct pt_late_sieve **sieves;           // of the lists: NULL, or what runs on a range before the pass does
     struct pt_buffer *parts;                 // of the lists
     struct pt_buffer **buffers;
     uint32_t count;
@@ -366,6 +368,9 @@ static int run_range(const struct bound *bound, struct pt_buffer *const *whole, 
         bound->parts[i].data = (void *)(uintptr_t)(list->chunks + first); // which kernels only read
         bound->parts[i].size = (end - first) * sizeof *list->chunks;
         bound->buffers[list->ref] = &bound->parts[i];
+        const int error = bound->sieves[i] && end > first ? pt_sieve_run(bound->sieves[i], &bound->parts[i]) : PATINA_OK;
+        if (error)
+            return error;
     }
     return run(context, bound->buffers);
 }
@@ -432,27 +437,42 @@ static struct chunk_view *keep_marked(const struct pt_pager *pager, const struct
     return kept;
 }
 
+// Finds the sieves that wait for a pass. Its lists then read what these read, too.
+static void find_sieves(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass, struct bound *bound,
+                        struct pt_chunk_list *lists)
+{
+    for (uint32_t i = 0; i < bound->count; i++) {
+        bound->sieves[i] = pt_sieve_of(pager->sieves, plan, pass, lists[i].ref);
+        if (bound->sieves[i])
+            pt_sieve_join(bound->sieves[i], &lists[i]);
+    }
+}
+
 static int run_pass(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
                     struct pt_buffer *const *buffers, pt_run_bound *run, void *context)
 {
     struct pt_chunk_list *lists = calloc(2 * (pass->ref_count + 1u), sizeof *lists);
-    struct bound bound = {.lists = lists, .most = pager->round};
+    struct bound bound = {.lists = lists, .most = pager->round, .sieves = calloc(pass->ref_count + 1u, sizeof *bound.sieves)};
     struct chunk_view *marked = NULL;
     uint64_t bytes = 0;
     uint32_t ranges = 0;
-    if (lists) {
-        bound.count = pt_pass_lists(plan, pass, lists);
-        for (uint32_t i = 0; i < bound.count; i++) { // of a layer or a part they are not all that was planned
-            struct pt_chunk_list *list = &lists[i];
-            list->chunks = buffers[list->ref]->data ? buffers[list->ref]->data : list->chunks;
-            list->count = (uint32_t)(buffers[list->ref]->size / sizeof *list->chunks);
-        }
-        bound.all = memcpy(lists + pass->ref_count + 1, lists, bound.count * sizeof *lists);
-        marked = bound.count == 1 ? keep_marked(pager, pass, buffers, &lists[0]) : NULL;
-        ranges = pt_count_ranges(lists, bound.count, pager->cap ? pager->round : UINT64_MAX, &bytes);
-        ranges = ranges > 1 && !pt_pass_divides(pass) ? 1 : ranges;
-        pager->rounds = ranges > pager->rounds ? ranges : pager->rounds;
+    if (!lists || !bound.sieves) {
+        free(lists);
+        free(bound.sieves);
+        return pt_fail(&pager->device->handle, PATINA_ERROR_MEMORY, "looking at pages of files: out of memory");
     }
+    bound.count = pt_pass_lists(plan, pass, lists);
+    find_sieves(pager, plan, pass, &bound, lists);
+    for (uint32_t i = 0; i < bound.count; i++) { // of a layer or a part they are not all that was planned
+        struct pt_chunk_list *list = &lists[i];
+        list->chunks = buffers[list->ref]->data ? buffers[list->ref]->data : list->chunks;
+        list->count = (uint32_t)(buffers[list->ref]->size / sizeof *list->chunks);
+    }
+    bound.all = memcpy(lists + pass->ref_count + 1, lists, bound.count * sizeof *lists);
+    marked = bound.count == 1 ? keep_marked(pager, pass, buffers, &lists[0]) : NULL;
+    ranges = pt_count_ranges(lists, bound.count, pager->cap ? pager->round : UINT64_MAX, &bytes);
+    ranges = ranges > 1 && !pt_pass_divides(pass) ? 1 : ranges;
+    pager->rounds = ranges > pager->rounds ? ranges : pager->rounds;
     const int hiding = hides(pager, pass, bytes);
     if (ranges > 1 || hiding || marked) {
         bound.parts = calloc(bound.count, sizeof *bound.parts);
@@ -466,10 +486,16 @@ static int run_pass(struct pt_pager *pager, const struct pt_plan *plan, const st
         error = run_ranges(pager, pass, &bound, buffers, run, context);
     } else { // in one, which need not be held whole: whoever runs it looks after that
         pager->read += bytes;
-        error = lists ? check_lists(pager, pass, lists, bound.count) : PATINA_OK;
+        error = check_lists(pager, pass, lists, bound.count);
+        for (uint32_t i = 0; i < bound.count && !error; i++)
+            error = bound.sieves[i] ? pt_sieve_run(bound.sieves[i], buffers[lists[i].ref]) : PATINA_OK;
         error = error ? error : run(context, buffers);
     }
     pt_hiding_end(&bound.hiding);
+    for (uint32_t i = 0; i < bound.count; i++)
+        if (bound.sieves[i])
+            pt_sieve_drop(&pager->sieves, bound.sieves[i]);
+    free(bound.sieves);
     free(marked);
     free(lists);
     free(bound.parts);
@@ -478,9 +504,13 @@ static int run_pass(struct pt_pager *pager, const struct pt_plan *plan, const st
 }
 
 int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
-                 struct pt_buffer *const *buffers, pt_run_bound *run, void *context)
+                 struct pt_buffer *const *buffers, pt_run_bound *run, void *context, size_t context_size)
 {
     const int alone = !pager || !pager->mapped || pager->device->copies; // a device that copies looks after its ranges itself
+    if (!alone && pager->cap && !pager->merged && pt_sieve_waits(plan, pass))
+        return pt_sieve_keep(&pager->sieves, plan, pass, buffers, run, context, context_size)
+                   ? pt_fail(&pager->device->handle, PATINA_ERROR_MEMORY, "looking at pages of files: out of memory")
+                   : PATINA_OK;
     const int error = alone ? run(context, buffers) : run_pass(pager, plan, pass, buffers, run, context);
     return error ? error : pt_pager_lose(pager);
 }

@@ -5,7 +5,7 @@
 #define PT_PAGER_H
 
 #include "base/look.h"
-#include "plan/rounds.h"
+#include "late_sieve.h"
 
 struct pt_pager {
     struct patina_device *device;
@@ -18,10 +18,11 @@ struct pt_pager {
     atomic_uint returned;
     uint64_t mapped, read;
     uint32_t rounds;
-    uint64_t losses;          // of mapped files, as far as was looked
-    uint32_t lost;            // pages of the scene's clouds that were known to be lost then
-    int merged;               // parts' keys stand for those of passes that write least keys, which do not run
-    const atomic_int *cancel; // NULL: nothing stops it
+    uint64_t losses;              // of mapped files, as far as was looked
+    uint32_t lost;                // pages of the scene's clouds that were known to be lost then
+    int merged;                   // parts' keys stand for those of passes that write least keys, which do not run
+    const atomic_int *cancel;     // NULL: nothing stops it
+    struct pt_late_sieve *sieves; // of the plan at hand, for the pass that reads their words
 };
 
 // Pages that are read for the first time are looked at: what begins, opens and runs may return PT_AGAIN (page_check.h).
@@ -43,8 +44,8 @@ int pt_pager_begin_pass(struct pt_pager *pager, const struct pt_plan *plan, cons
 uint64_t pt_pager_cap(const struct patina_device *device, const struct patina_scene *scene, uint64_t *round);
 
 // Runs a pass whose buffers are bound, in rounds where it takes any. *lists: what the caller bound, where it is not what was planned.
-typedef int pt_run_bound(void *context, struct pt_buffer *const *buffers);
+// The context may be copied: a sieve that one pass alone reads runs with that pass.
 int pt_pager_run(struct pt_pager *pager, const struct pt_plan *plan, const struct pt_pass *pass,
-                 struct pt_buffer *const *buffers, pt_run_bound *run, void *context);
+                 struct pt_buffer *const *buffers, pt_run_bound *run, void *context, size_t context_size);
 
 #endif

@@ -89,7 +89,7 @@ static int run_pass(struct pt_execution *e, uint32_t i)
         note_bytes(e, NULL, pass, bound);
         struct call call = {e, pass, arguments};
         do
-            error = pt_pager_run(e->pager, e->plan, pass, bound, run_bound, &call);
+            error = pt_pager_run(e->pager, e->plan, pass, bound, run_bound, &call, sizeof call);
         while (error == PT_MORE_ROOM && !(error = grow_bins(e, pass, bound)));
     }
     if (bound != few)

@@ -435,7 +435,7 @@ static uint64_t held_after(patina_device *device, const patina_scene *scene, enu
                 none[k].size = plan.instances[ref->index].chunk_count * sizeof *plan.instances->chunks;
             }
         }
-        assert_int_equal(pt_pager_run(&pager, &plan, pass, bound, no_run, &runs), wanted);
+        assert_int_equal(pt_pager_run(&pager, &plan, pass, bound, no_run, &runs, sizeof runs), wanted);
         held = pt_file_memory() - pager.before;
         free(none);
         free(bound);

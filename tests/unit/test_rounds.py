@@ -65,9 +65,9 @@ def test_shadows():
 
 
 def test_street():
-    """What houses hide is not read, where no point is left out for its trust: that looks at all points first."""
-    whole, fits, _ = draw("whole.png", "--memory", "100G", "--surface", "fill", "--trust", "0", look=STREET)
-    rounds, told, _ = draw("rounds.png", "--memory", f"{CAP}M", "--surface", "fill", "--trust", "0", look=STREET)
+    """What houses hide is not read, whether or not points are left out for their trust."""
+    whole, fits, _ = draw("whole.png", "--memory", "100G", "--surface", "fill", look=STREET)
+    rounds, told, _ = draw("rounds.png", "--memory", f"{CAP}M", "--surface", "fill", look=STREET)
     print(f"  street: {told} of {fits}")
     assert whole == rounds, "the bytes differ"
     assert told["cap"] == CAP * 10**6 and fits["cap"] == 0 and told["read"] < 0.6 * fits["read"], (told, fits)
