@@ -30,6 +30,7 @@ struct pt_neighbourhood {
     double certainty;          // 0..1, of the kind; shape words do not hold it
     double trust;              // 0..1, see trust.h; not found here
     int beside;                // another surface lies that near
+    int afar;                  // flat from afar alone: its nearest neighbors are a volume
     double uneven;             // spacing along the greater axis in those across, as measured; 1: not told
 };
 

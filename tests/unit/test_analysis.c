@@ -342,6 +342,40 @@ static void test_parts(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// The slats of a lattice are lines near by and a surface farther off. Footprints must leave its meshes open.
+static void test_lattice(void **state)
+{
+    (void)state;
+    enum { FLOOR = 20000, SLATS = 20, LENGTH = 120, LATTICE = 2 * SLATS * LENGTH, COUNT = FLOOR + LATTICE };
+    static double p[COUNT][3];
+    struct pcg random = pcg_seed(6);
+    uint32_t n = 0;
+    for (; n < FLOOR; n++) {
+        p[n][0] = 140.0 * pcg_unit(&random);
+        p[n][1] = 140.0 * pcg_unit(&random);
+    }
+    for (int way = 0; way < 2; way++)
+        for (int slat = 0; slat < SLATS; slat++)
+            for (int i = 0; i < LENGTH; i++, n++) {
+                p[n][way ? 2 : 0] = 6.0 * slat + 0.8 * (pcg_unit(&random) - 0.5);
+                p[n][way ? 0 : 2] = i + 0.2 * pcg_unit(&random);
+                p[n][1] = 200.0;
+            }
+    patina_cloud *cloud = build_doubles(&p[0][0], COUNT);
+    analyse(cloud, 0);
+    struct read r = read_cloud(cloud);
+    double sum = 0.0, floor = 0.0;
+    for (uint32_t i = 0; i < COUNT; i++)
+        *(i < FLOOR ? &floor : &sum) += (double)(r.half_axes[2 * i] * r.half_axes[2 * i + 1]);
+    sum = sqrt(sum / LATTICE);
+    floor = sqrt(floor / FLOOR);
+    printf("  lattice 1 : 6: half axes of %.2f spacings along a slat; of random points on a floor %.2f\n", sum, floor);
+    assert_true(sum < 1.5); // 1.81 without the bound by the nearest
+    assert_true(floor > 0.8);
+    read_free(&r);
+    patina_cloud_destroy(cloud);
+}
+
 // 1 mm of detail at 5e6 m: the same words as at the origin.
 static void test_far_away(void **state)
 {
@@ -633,7 +667,7 @@ int main(void)
         cmocka_unit_test(test_sigma),      cmocka_unit_test(test_far_away),       cmocka_unit_test(test_hard),
         cmocka_unit_test(test_words),      cmocka_unit_test(test_threads),        cmocka_unit_test(test_orientation),
         cmocka_unit_test(test_votes),      cmocka_unit_test(test_saved_and_task), cmocka_unit_test(test_cancel_and_refusals),
-        cmocka_unit_test(test_soft),       cmocka_unit_test(test_parts),
+        cmocka_unit_test(test_soft),       cmocka_unit_test(test_parts),          cmocka_unit_test(test_lattice),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
