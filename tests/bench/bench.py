@@ -214,6 +214,8 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
                lambda options: imports.measure(1_000_000 if options.quick else 30_000_000, options.library)),
     "viewport": ("viewport", "Viewport",
                  lambda options: window.measure(1_000_000 if options.quick else 10_000_000, options.library)),
+    "frames": ("viewport", "Frames of each Blender",
+               lambda options: window.versions((1_000_000,) if options.quick else (1_000_000, 10_000_000), options.library)),
     "leaves": ("leaves", "Specks of shadows", lambda options: quoted.leaves(options.library)),
     "analysis": ("analysis", "What every point knows",
                  lambda options: analysis.times(1_000_000 if options.quick else 10_000_000, options.library)),

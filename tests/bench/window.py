@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A viewport that orbits many points, in a real window: what Patina takes, what the upload takes, what Blender takes alone.
 
-tests/blender/figures.py measures, in Blender under Xvfb. There everything runs on the same cores: Patina's work, and Blender's
+tests/blender/figures.py and frame_figures.py measure, in Blender under Xvfb. There everything runs on the same cores: Patina's work, and Blender's
 window through llvmpipe.
 """
 
@@ -30,6 +30,56 @@ ROWS = (
     ("from the last motion to the whole picture, s", "rest_s", "{:.2f}"),
     ("of that Patina's work on the whole picture, ms", "whole_ms", "{:.1f}"),
 )
+
+
+VERSIONS = (("3.4", "opengl"), ("5.2", "opengl"), ("5.2", "vulkan"))
+PARTS = (  # of a frame, with overlays hidden or shown
+    ("a redraw of the orbit, all of it", "whole_ms"),
+    ("Blender alone, Patina's drawing left out", "bare_ms"),
+    ("with the last image uploaded and drawn, without a new one", "shown_ms"),
+    ("of that the upload of the image", "upload_ms"),
+    ("of that the search for the nearest depths around each pixel", "cover_ms"),
+    ("of that drawing the image, and uploading its depths", "draw_ms"),
+    ("of that erasing the overlays behind the points", "after_ms"),
+    ("Patina's work on a new image while moving, ms by the clock", "picture_ms"),
+)
+
+
+def versions(counts: tuple[int, ...], library: Path) -> str:
+    """A table of what a frame takes in each Blender that is there, or "skip: " and why there is none."""
+    if not shutil.which("xvfb-run"):
+        return "skip: needs xvfb-run (build/setup test)."
+    tables, notes = [], []
+    for points in counts:
+        found = {}
+        for version, backend in VERSIONS:
+            got = _frames(points, version, backend, library)
+            if isinstance(got, str):
+                notes.append(f"Blender {version}, {backend}: {got}")
+            else:
+                found[f"{version} {'OpenGL' if backend == 'opengl' else 'Vulkan'}"] = got
+        if found:
+            some = next(iter(found.values()))
+            rows = [f"| {points:,} points, {some['width']} × {some['height']}, overlays | | " + " | ".join(found) + " |",
+                    "|---|---|" + "---|" * len(found)]
+            for overlays in ("hidden", "shown"):
+                rows += [f"| {overlays} | {label} | " + " | ".join(f"{got[overlays][key]:.1f}" for got in found.values()) + " |" for label, key in PARTS]
+            tables.append("\n".join(rows))
+    return "\n\n".join([*tables, *notes]) if tables else f"skip: {'; '.join(notes)}"
+
+
+def _frames(points: int, version: str, backend: str, library: Path) -> dict | str:
+    """What tests/blender/frame_figures.py says; a text: why nothing."""
+    provided = subprocess.run([ROOT / "build/blender", version], capture_output=True, text=True, check=False)
+    if provided.returncode:
+        return (provided.stderr.strip().splitlines() or ["not there"])[-1]
+    command = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", provided.stdout.split()[-1]]
+    command += ["--gpu-backend", backend] if version != "3.4" else []
+    command += ["--enable-event-simulate", "--factory-startup", "--python", str(ROOT / "tests/blender/test_window.py"), "--", "frames"]
+    done = subprocess.run(command, env={**os.environ, "PATINA_LIBRARY": str(library), "PATINA_FIGURES_POINTS": str(points)}, capture_output=True,
+                          text=True, check=False)
+    found = [line for line in done.stdout.splitlines() if line.startswith('{"points"')]
+    return json.loads(found[-1]) if found and not done.returncode else (done.stdout.strip().splitlines() or ["failed"])[-1]
 
 
 def measure(points: int, library: Path) -> str:
