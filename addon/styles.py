@@ -160,7 +160,7 @@ def _parse(path: Path) -> dict[str, Any]:
         raise StyleError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise StyleError(f"{path.name} is no text in UTF-8") from None
-    except (ValueError, RecursionError) as error:  # numbers of thousands of digits, too
+    except (ValueError, RecursionError) as error:  # ValueError alone: a number of more digits than Python reads
         where = f", line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise StyleError(f"{path.name}{where}: no valid JSON") from None
     if not isinstance(found, dict) or "patina_style" not in found:

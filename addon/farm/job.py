@@ -83,6 +83,7 @@ def write(folder: Path, job: dict) -> None:
     """The folder of a job; job: as task.py reads it, without what is found here. OSError where it cannot be written."""
     folder.mkdir(parents=True, exist_ok=True)
     job = {"patina_job": 1, "rounds": 1, "arguments": [], "files": {}, **job}
+    job["name"] = "".join(letter if letter.isprintable() else "_" for letter in job["name"])[:200]  # it becomes a part of scripts
     for name in COPIED:
         shutil.copyfile(HERE / name, folder / name)
     for name, content in (("template.json", template_of(job)), ("flamenco.json", flamenco_of(job, folder)), ("job.json", job)):

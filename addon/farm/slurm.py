@@ -63,7 +63,7 @@ def main() -> int:
         job = task.read_job()
     except task.Wrong as error:
         print(f"patina job: {error}", file=sys.stderr)
-        return 1
+        return task.WRONG
     (FOLDER / "logs").mkdir(exist_ok=True)
     (FOLDER / "slurm").mkdir(exist_ok=True)
     before = ""

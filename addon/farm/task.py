@@ -21,6 +21,9 @@ ENDS = 1 << 20  # bytes at either end of a file that tell whether it is the job'
 LARGEST = 64 << 20  # bytes of a job.json
 AGAIN = 3  # patina merge: another round is wanted
 WRONG = 1
+MOST = 1_000_000  # tasks
+MOST_LETTERS = 4096  # of a name, a path or an argument
+WRITES = {"-o", "--output", "--dump-planes", "--save-shadows"}  # options of patina render
 
 
 class Wrong(Exception):
@@ -49,39 +52,66 @@ def read_job() -> dict:
     except ValueError as error:
         raise Wrong(f"{FOLDER}/job.json is damaged: {error}") from error
     except RecursionError:
-        raise Wrong(f"{FOLDER}/job.json is damaged: its lists are too deep") from None
+        raise Wrong(f"{FOLDER}/job.json is damaged: lists in lists") from None
     if not isinstance(job, dict) or job.get("patina_job") != 1:
         raise Wrong(f"{FOLDER}/job.json is of another version")
-    lacking = lacks(job)
-    if lacking:
-        raise Wrong(f"{FOLDER}/job.json is damaged: '{lacking}' is missing, or not what it should be")
+    wrong = wrong_of(job)
+    if wrong:
+        raise Wrong(f"{FOLDER}/job.json is damaged: {wrong}")
     return job
 
 
-def texts(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(text, str) and "\0" not in text for text in value)
+def _is_text(value: object) -> bool:
+    """One line without control characters: it becomes a part of scripts, logs and paths."""
+    return isinstance(value, str) and len(value) <= MOST_LETTERS and not any(
+        ord(letter) < 32 or 127 <= ord(letter) < 160 or letter in "\u2028\u2029" for letter in value)
 
 
-def numbers(value: object) -> bool:
-    return isinstance(value, list) and all(type(number) is int for number in value)
+def _are(kind: object, values: object, count: int = -1) -> bool:
+    return isinstance(values, list) and all(kind(value) for value in values) and count in (-1, len(values))
 
 
-def lacks(job: dict) -> str:
-    """The first key of a job that is missing, or of another type; "" where none is."""
-    for key in ("kind", "name", "by", "program", "version", "directory", "output"):
-        if not texts([job.get(key)]) or not job[key] and key not in ("name", "version"):
-            return key
-    kinds = {"frames": lambda value: numbers(value) and all(0 <= number < 1 << 31 for number in value),
-             "tiles": lambda value: numbers(value) and len(value) == 2 and min(value) > 0 and max(value) < 1 << 16,
-             "parts": lambda value: type(value) is int and 0 < value < 1 << 16}
-    if job["kind"] not in kinds or job["by"] not in ("patina", "blender"):
-        return "kind" if job["kind"] not in kinds else "by"
-    checks = {job["kind"]: kinds[job["kind"]], "rounds": lambda value: type(value) is int and 0 < value < 1 << 16, "arguments": texts,
-              "files": lambda value: isinstance(value, dict) and texts(list(value)),
-              "convert": lambda value: isinstance(value, list) and all(texts(pair) and len(pair) == 2 for pair in value)}
-    if job["kind"] == "frames" and job["by"] == "patina":
-        checks["options"] = lambda value: isinstance(value, list) and len(value) == len(job["frames"]) and all(map(texts, value))
-    return next((key for key, good in checks.items() if not good(job.get(key, [] if key == "convert" else None))), "")
+def _is_count(value: object) -> bool:
+    return type(value) is int and 1 <= value <= MOST
+
+
+def _is_frame(value: object) -> bool:
+    return type(value) is int and abs(value) <= 1 << 30
+
+
+def _are_arguments(values: object) -> bool:
+    """Of patina render, which draw and write nothing: where the image goes, the task says."""
+    return _are(lambda word: _is_text(word) and word.split("=")[0] not in WRITES, values)
+
+
+def _are_files(files: object) -> bool:
+    return isinstance(files, dict) and all(_is_text(name) and _are(lambda part: isinstance(part, (int, str)), look, 2) for name, look in files.items())
+
+
+def _is_converted(pair: object) -> bool:
+    """Clouds are built within the job's folder."""
+    return _are(_is_text, pair, 2) and pair[1].endswith(".cloud") and FOLDER in Path(os.path.abspath(FOLDER / pair[1])).parents
+
+
+def wrong_of(job: dict) -> str:
+    """What of a job's file is not as job.py writes it; "": nothing. Its content may be a stranger's: it must not become commands, nor
+    make programs write anywhere but to the output."""
+    rules = {"name": _is_text, "kind": lambda kind: kind in ("frames", "tiles", "parts"), "by": lambda by: by in ("patina", "blender"),
+             "program": _is_text, "version": _is_text, "directory": _is_text, "files": _are_files, "rounds": _is_count,
+             "output": lambda path: _is_text(path) and not Path(path).name.startswith(".")}
+    if "convert" in job:
+        rules["convert"] = lambda pairs: _are(_is_converted, pairs)
+    if job.get("kind") == "frames":
+        rules["frames"] = lambda frames: _are(_is_frame, frames) and 0 < len(frames) <= MOST
+    elif job.get("kind") == "tiles":
+        rules["tiles"] = lambda tiles: _are(_is_count, tiles, 2) and tiles[0] * tiles[1] <= MOST
+    else:
+        rules["parts"] = _is_count
+    if job.get("by") == "patina":
+        rules["arguments"] = _are_arguments
+        if job.get("kind") == "frames":
+            rules["options"] = lambda lines: _are(_are_arguments, lines, len(job["frames"]) if isinstance(job.get("frames"), list) else -1)
+    return next((f"'{name}' is missing, or is not as jobs have it" for name, rule in rules.items() if not rule(job.get(name))), "")
 
 
 def program_of(job: dict) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import os
 import struct
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -169,8 +170,9 @@ def _before(file: BinaryIO, at: int, records: int, end: int) -> Iterator[tuple[b
 def _behind(file: BinaryIO, head: bytes) -> Iterator[tuple[bytes, int, bytes]]:
     """LAS 1.4 alone."""
     at, records = struct.unpack_from("<QI", head, 235) if head[24:26] >= b"\x01\x04" and len(head) >= 247 else (0, 0)
+    size = file.seek(0, os.SEEK_END)
     for _ in range(min(records, 4096)):
-        if at > 1 << 62:
+        if at > size:  # file systems refuse to seek to places far behind a file's end
             return
         file.seek(at)
         record = file.read(60)

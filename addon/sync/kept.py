@@ -83,7 +83,7 @@ def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], lis
     try:
         notes = json.loads(path.read_text("utf-8"))
     except RecursionError:
-        raise ValueError(f"{path} is damaged") from None
+        raise ValueError(f"{path} holds lists in lists") from None
     if not isinstance(notes, dict):
         raise ValueError(f"{path} holds no object")
     if notes.pop("sum", None) not in {None, _sum_of_notes(notes)}:  # None: of an older version
@@ -145,7 +145,10 @@ def remove_left(place: Path) -> None:
 def _numbers(values: Any) -> list[float]:
     if not isinstance(values, list) or not all(type(value) in {int, float} for value in values):
         raise ValueError("numbers were expected")
-    return [float(value) for value in values]
+    try:
+        return [float(value) for value in values]
+    except OverflowError:
+        raise ValueError("numbers were expected that a float can hold") from None
 
 
 class Checks:

@@ -233,6 +233,10 @@ def test_las_heads():
         points = read(written("box.las", las_bytes(box=box)))
         assert np.allclose(points.positions[:, 0] + points.origin[0], np.arange(1000) / 1000, atol=1e-6), (box, points.positions[:3], points.origin)
         assert "its box" in points.warnings[0], points.warnings
+    for place in (1 << 40, (1 << 62) - 1, (1 << 64) - 1):  # records behind the points: no file system seeks that far
+        data = bytearray(las_bytes(10, 6, 30, 4))
+        struct.pack_into("<QI", data, 235, place, 3)
+        assert len(read(written("behind.las", bytes(data))).positions) == 10
     assert read(written("good.las", las_bytes())).warnings == []
 
 
