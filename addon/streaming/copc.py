@@ -18,6 +18,7 @@ from source import Pace, Source, SourceError
 # Budgets of a file. Ten billion points in nodes of 65,000 are 150,000 nodes.
 MOST_NODES = 1 << 21
 MOST_PAGES = 10_000  # of the hierarchy
+MOST_DEPTH = 30  # levels
 MOST_HEAD = 1 << 24  # bytes before the points
 MOST_POINTS = 1 << 24  # of a node: more is no octree
 PACKED = 2  # times the bytes of its records, and EXTRA bytes: more than a node ever takes when it is packed
@@ -114,10 +115,10 @@ def _records(source: Source, end: int, count: int) -> tuple[bytes, str]:
 
 def _hierarchy(source: Source, root: int, root_size: int, record_size: int) -> np.ndarray:
     """Entries of all nodes with points, by their key."""
-    pages, found, seen, total = [(root, root_size)], [], set(), 0
+    pages, found, seen, total = [(root, root_size, None)], [], set(), 0
     pace = Pace(MOST_PAGES, ENTRY.itemsize * (MOST_NODES + MOST_PAGES))
     while pages:
-        offset, size = pages.pop()
+        offset, size, key = pages.pop()
         if offset in seen or offset > 1 << 60 or size <= 0 or size % ENTRY.itemsize or size > ENTRY.itemsize * MOST_NODES:
             raise SourceError("its octree is damaged: a page of the hierarchy lies nowhere, or twice")
         seen.add(offset)
@@ -125,7 +126,11 @@ def _hierarchy(source: Source, root: int, root_size: int, record_size: int) -> n
         pace.add(size)
         if len(pages) + len(seen) + int((entries["count"] == -1).sum()) > MOST_PAGES:
             raise SourceError(f"its octree is damaged: its hierarchy has more than {MOST_PAGES:,} pages")
-        pages += [(int(entry["offset"]), int(entry["size"])) for entry in entries[entries["count"] == -1]]
+        for entry in entries[entries["count"] == -1]:
+            below = tuple(entry["key"].tolist())
+            if key is not None and not is_below(below, key):
+                raise SourceError(NOT_BELOW)
+            pages.append((int(entry["offset"]), int(entry["size"]), below))
         found.append(entries[entries["count"] > 0])
         total += len(found[-1])
         if total > MOST_NODES:
@@ -138,6 +143,15 @@ def _hierarchy(source: Source, root: int, root_size: int, record_size: int) -> n
         worst = nodes[np.argmax(nodes["size"] > most)]
         raise SourceError(f"its octree is damaged: a node of {worst['count']:,} points takes {worst['size']:,} bytes")
     return in_order(nodes)
+
+
+NOT_BELOW = "its octree is damaged: a page of its hierarchy leads to one that is not below it"
+
+
+def is_below(key: tuple[int, ...], above: tuple[int, ...]) -> bool:
+    """Whether a cube, (depth, x, y, z), lies within another and is smaller: chains of pages are no longer than the octree is deep."""
+    levels = key[0] - above[0]
+    return 0 < levels and key[0] <= MOST_DEPTH and all(own >> levels == its for own, its in zip(key[1:], above[1:]))
 
 
 def in_order(nodes: np.ndarray) -> np.ndarray:
@@ -160,7 +174,7 @@ def arrange(nodes: np.ndarray, center: np.ndarray, half: float, gap: float) -> t
     """Of nodes sorted by key: parents, cubes and gaps. SourceError where they are no octree's."""
     keys = nodes["key"].astype(np.int64)
     depth = keys[:, 0]
-    if depth.min() < 0 or depth.max() > 30 or (keys[:, 1:] < 0).any() or (keys[:, 1:] >= (1 << depth)[:, None]).any():
+    if depth.min() < 0 or depth.max() > MOST_DEPTH or (keys[:, 1:] < 0).any() or (keys[:, 1:] >= (1 << depth)[:, None]).any():
         raise SourceError("its octree is damaged: a node lies outside of it")
     parents = _parents(keys)
     side = 2.0 * half / (1 << depth)

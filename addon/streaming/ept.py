@@ -123,7 +123,8 @@ def _hierarchy(source: Source, zipped: bool) -> np.ndarray:
     try:
         while waiting:
             below = []
-            for name, counts, size in pool.map(lambda key: _counts(source, key, zipped), waiting):
+            for page, (name, counts, size) in zip(waiting, pool.map(lambda key: _counts(source, key, zipped), waiting)):
+                above = tuple(map(int, page.split("-")))
                 pace.add(size)
                 own: list[tuple[int, ...]] = []
                 for key, count in counts.items():
@@ -133,6 +134,8 @@ def _hierarchy(source: Source, zipped: bool) -> np.ndarray:
                     if count == -1:
                         if key in seen:
                             raise SourceError(f"its octree is damaged: {name} points to {key}, which was read before")
+                        if not copc.is_below(tuple(map(int, match.groups())), above):
+                            raise SourceError(copc.NOT_BELOW)
                         seen.add(key)
                         below.append(key)
                     elif count:

@@ -329,7 +329,7 @@ def test_address():
 
 def test_servers_that_fail():
     path, _, _ = made("fails.copc.laz", 8000)
-    for how, told in (("hangs", "does not answer in time"), ("cut", "cut the connection"), ("garbage", "page "), ("other", "another part"),
+    for how, told in (("hangs", "does not answer in time"), ("cut", "cut the connection"), ("garbage", "page "), ("other", "a different part"),
                       ("refuses", "answers 404"), ("whole", "sends no parts of files")):
         clouds.CACHE.clear()
         new_scene()

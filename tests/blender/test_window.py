@@ -3,7 +3,7 @@
 
     xvfb-run -a -s "-screen 0 1280x800x24" blender --enable-event-simulate --factory-startup --python tests/blender/test_window.py [-- NAME ...]
 
-NAME figures measures instead (figures.py), and frames (frame_figures.py); long_session is for long_session.py. --some leaves out what neither Blender's version nor its
+NAME figures measures instead (figures.py), and frames (frame_figures.py); long_session and artist are for long_session.py. --some leaves out what neither Blender's version nor its
 graphics change (ONCE), --drawn runs only tests that look at what Blender's graphics drew (DRAWN): for a second backend. A test is a
 generator: it yields what it waits for, a function that says whether it has come.
 """
@@ -67,6 +67,10 @@ def tests():
     if names == ["long_session"]:
         import session_rounds
         yield "long_session", session_rounds.long_session
+        return
+    if names == ["artist"]:
+        import artist
+        yield "artist", artist.artist
         return
     if names == ["figures"]:
         import figures

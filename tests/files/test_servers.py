@@ -128,8 +128,13 @@ CASES = {
     "cut": (part()[:-30], "cut the connection after 70 of 100 bytes", 1),
     "nothing": (b"", "the connection broke off", 1),
     "no HTTP": (b"\x00\x01\x02 hello\r\n\r\n", "the connection broke off", 1),
-    "5,000 digits": (part(**{"Content-Range": f"bytes 0-99/{'9' * 5000}"}), "sent another part", 1),
-    "another part": (part(first=7, last=106), "sent another part", 1),
+    "redirect to another, and on to ftp": (moved("/on"), "an address of 'ftp', which is not opened", 2),
+    "Retry-After of a date": (in_turn(b"HTTP/1.1 503 Busy\r\nRetry-After: Wed, 21 Oct 2015 07:28:00 GMT\r\n\r\n", part()), DATA[:100], 2),
+    "Retry-After of nonsense": (in_turn(b"HTTP/1.1 429 Busy\r\nRetry-After: -5e999 \x1b\r\n\r\n", part()), DATA[:100], 2),
+    "100 Continue and then nothing": (endless(b"HTTP/1.1 100 Continue\r\n\r\n", b"", 6.0), "does not answer in time", 4),
+    "5,000 digits of length": (part(**{"Content-Length": "9" * 5000}), DATA[:100], 2),
+    "5,000 digits": (part(**{"Content-Range": f"bytes 0-99/{'9' * 5000}"}), "sent a different part", 1),
+    "another part": (part(first=7, last=106), "sent a different part", 1),
     "gzip unasked": (part(**{"Content-Encoding": "gzip"}), "packed as 'gzip', which was not asked for", 1),
     "whole file": (b"HTTP/1.1 200 OK\r\nContent-Length: 1000\r\n\r\n" + DATA, "sends no parts of files", 1),
     "odd words": (b"HTTP/1.1 404 a\x1b[31m\r\n\r\n", "answers 404 a?[31m", 1),
@@ -152,7 +157,7 @@ def outcome(address, took_at_most):
 
 def test_requests():
     for name, (answer, wanted, seconds) in CASES.items():
-        with server({"*": answer, "/good": part()}) as port:
+        with server({"*": answer, "/good": part(), "/on": moved("ftp://127.0.0.1/x")}) as port:
             found, took = outcome(f"http://127.0.0.1:{port}/case", seconds)
         good = found == wanted if isinstance(wanted, bytes) else isinstance(found, str) and wanted in found
         assert good, f"{name}: {found}"
@@ -186,12 +191,12 @@ def test_encryption():
 # ---- what is streamed
 
 
-def streamed(place, pages=(), seconds=20.0, workers=4):
-    """What the reading process says of a place, and the most memory it took, in MB."""
+def streamed(place, pages=(), seconds=20.0, workers=4, **options):
+    """What the reading process says of a place, and the most memory it took, in MB. options: further ones of the process."""
     folder = Path(tempfile.mkdtemp(dir=SCRATCH))
     process = subprocess.Popen([sys.executable, str(ROOT / "addon/streaming/reader.py"), str(folder)], stdin=subprocess.PIPE)
     try:
-        process.stdin.write(json.dumps({"place": str(place), "workers": workers, **IN_A_HURRY}).encode() + b"\n")
+        process.stdin.write(json.dumps({"place": str(place), "workers": workers, **IN_A_HURRY, **options}).encode() + b"\n")
         process.stdin.flush()
         until, said = time.monotonic() + seconds, ""
         while not said and time.monotonic() < until and process.poll() is None:
@@ -253,8 +258,11 @@ def test_hierarchies_of_copc():
     struct.pack_into("<2Q", data, 469, size, pages.nbytes)
     bad.write_bytes(bytes(data) + pages.tobytes())
     refused(bad, "more than 10,000 pages")
-    chain = [((0, 0, 0, 0), size + 32 * (i + 1), 32, -1) for i in range(10_100)]
-    refused(with_tree(path, bad, chain, 32), "more than 10,000 pages")
+    wide = [((14, i, 0, 0), size + 32 * (10_100 + i), 32, -1) for i in range(10_100)]
+    refused(with_tree(path, bad, wide), "more than 10,000 pages")
+    for chain in ([((0, 0, 0, 0), size + 32 * (i + 1), 32, -1) for i in range(100)], [((i + 1, 0, 0, 0), size + 32 * (i + 1), 32, -1) for i in range(100)],
+                  [((3, 1, 0, 0), size + 32, 32, -1), ((4, 0, 0, 0), size + 64, 32, -1)]):  # the same cube; too deep; beside
+        refused(with_tree(path, bad, chain, 32), "leads to one that is not below it")
     refused(with_tree(path, bad, [((0, 0, 0, 0), size, 32, -1)]), "lies nowhere, or twice")
     refused(with_tree(path, bad, entries, 32 * ((1 << 21) + 1)), "lies nowhere")
     refused(with_tree(path, bad, entries, 32 << 20), "ends before byte")
@@ -323,10 +331,41 @@ def test_hierarchies_of_ept():
     for count, words in ((33_000_000, "cut, or too large"), (9_000_000, "lists or objects among its numbers")):
         place.write_bytes(gzip.compress(b'{"0-0-0-0":[' + b"[]," * count + b"[]]}", 1))
         refused(folder / "ept.json", words, most=400)
-    place.write_bytes(gzip.compress(json.dumps({f"5-{i}-0-0": -1 for i in range(10_100)}).encode()))
+    place.write_bytes(gzip.compress(json.dumps({f"14-{i}-0-0": -1 for i in range(10_100)}).encode()))
     refused(folder / "ept.json", "10,000 pages")
     place.write_bytes(gzip.compress(json.dumps({"0-0-0-0": 1 << 24}).encode()))
     refused(folder / "ept.json", "MB of memory; at most 1,074 are taken")
+
+
+def test_chains_of_pages():
+    """A server whose pages lead to the next one for ever is left after as many as an octree has levels; of a tree that is refused the cache
+    holds nothing."""
+    folder, _ = ept_folder("chains")
+    asked = []
+
+    def page(connection, head):
+        depth, *place = map(int, head.split(b" ")[1].decode().rpartition("/")[2].partition(".")[0].split("-"))
+        asked.append(depth)
+        body = json.dumps({f"{depth + step}-{place[0]}-0-0": -1}).encode()
+        connection.sendall(f"HTTP/1.1 200 OK\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body)
+
+    for step, most in ((1, 40), (0, 2)):
+        keep = Path(tempfile.mkdtemp(dir=SCRATCH))
+        asked.clear()
+        with server({"/ept.json": whole(folder / "ept.json"), "*": page}) as port:
+            said, _ = streamed(f"http://127.0.0.1:{port}/ept.json", keep={"folder": str(keep), "bytes": 1 << 30})
+        assert "not below it" in said or "which was read before" in said, said
+        assert 0 < len(asked) <= most, len(asked)
+        left = [file for file in keep.rglob("*.kept")]
+        assert not left, left[:3]
+
+
+def test_limits_of_silence():
+    """By the artist's settings, not the test's: how long a server that never answers, or answers a byte every three seconds, is waited for."""
+    longest = source.TRIES * source.TIMEOUT + source.WAIT * (2 ** (source.TRIES - 1) - 1)
+    assert longest < 35, longest
+    import web
+    assert web.TIMEOUTS * source.TIMEOUT <= 30 and web.PACE / source.TIMEOUT >= 2000
 
 
 def test_nodes_of_ept():
