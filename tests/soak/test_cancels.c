@@ -99,7 +99,7 @@ static const struct work {
     int (*run)(struct stage *, patina_progress *);
     int by_frame;
     uint32_t most;
-} works[] = {{render, 1, 30000}, {bake, 1, 20000},   {upload, 0, 30000},        {analyse, 0, 200000},
+} works[] = {{render, 1, 30000}, {bake, 1, 20000},  {upload, 0, 30000},        {analyse, 0, 200000},
              {task, 0, 30000},   {verify, 0, 1000}, {analyse_file, 0, 300000}, {render, 1, 5000}};
 enum { WORKS = sizeof works / sizeof *works };
 
@@ -131,8 +131,12 @@ static void stage_begin(struct stage *s, patina_device *device)
     const double eye[3] = {0, -4, 1}, target[3] = {0, 0, 0};
     const patina_camera camera = camera_perspective(eye, target, 40.0, SIDE, SIDE, 0.1, 20.0);
     const patina_settings settings = {.struct_size = sizeof settings, .width = SIDE, .height = SIDE, .shadow_samples = 4};
-    const patina_light_desc light = {
-        .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .direction = {1, 1, -1}, .angle = 0.1f, .shadows = 1};
+    const patina_light_desc light = {.struct_size = sizeof light,
+                                     .type = PATINA_LIGHT_SUN,
+                                     .power = 3,
+                                     .direction = {1, 1, -1},
+                                     .angle = 0.1f,
+                                     .shadows = 1};
     *s = (struct stage){.points = points_torus(POINTS, 1.0, 0.4, POINTS_ALL, 1)};
     s->cloud = points_upload(&s->points);
     snprintf(s->path, sizeof s->path, "%s/good.cloud", getenv("TMPDIR"));

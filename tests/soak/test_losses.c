@@ -44,7 +44,8 @@ static int draw(const char *name, const patina_scene *scene, uint32_t lose_after
         assert_int_equal(code, PATINA_ERROR_DEVICE);
         assert_non_null(strstr(support_message(frame), "context was lost while"));
         assert_int_equal(patina_frame_render(frame, scene), PATINA_ERROR_DEVICE); // it stays lost
-        assert_int_not_equal(patina_frame_read(frame, PATINA_PASS_COMBINED, pixels, SIDE * SIDE * 4 * sizeof *pixels), PATINA_OK);
+        assert_int_not_equal(patina_frame_read(frame, PATINA_PASS_COMBINED, pixels, SIDE * SIDE * 4 * sizeof *pixels),
+                             PATINA_OK);
     }
     patina_frame_destroy(frame);
     patina_device_destroy(device);
