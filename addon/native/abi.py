@@ -413,6 +413,7 @@ CALLS = {
     "patina_grade_create": (c_void_p, c_void_p, POINTER(ScanGrade), c_uint32, POINTER(c_void_p)),
     "patina_grade_create_balanced": (c_void_p, c_void_p, POINTER(ScanGrade), c_void_p, c_uint32, POINTER(c_void_p)),
     "patina_grade_destroy": (c_void_p,),
+    "patina_cloud_balance": (c_void_p, c_void_p, c_uint32, c_void_p, c_void_p),
     "patina_scans_create": (c_void_p, c_void_p, POINTER(Scan), c_uint32, POINTER(c_void_p)),
     "patina_scans_destroy": (c_void_p,),
     "patina_field_create": (c_void_p, POINTER(FieldDesc), c_void_p, POINTER(c_void_p)),

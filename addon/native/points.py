@@ -26,17 +26,31 @@ class Mask(_Handle):
 
 class Grade(_Handle):
     """A cloud's own colors, changed by scan. scans: (count,) uint16, or None: all are of the first. grades: gain, gamma, saturation
-    and temperature of each, and perhaps gains of red, green and blue. PatinaError for a cloud without colors."""
+    and temperature of each. balance: (grades, 3) gains of red, green and blue before these, or None. PatinaError for a cloud without
+    colors."""
 
     _kind = "grade"
 
-    def __init__(self, cloud: Cloud, scans: np.ndarray | None, grades: Sequence[Sequence[float]]) -> None:
+    def __init__(self, cloud: Cloud, scans: np.ndarray | None, grades: Sequence[Sequence[float]],
+                 balance: np.ndarray | None = None) -> None:
         if scans is not None and (scans.dtype != np.uint16 or len(scans) != cloud.count or not scans.flags.c_contiguous):
             raise PatinaError("scans are a uint16 for each point")
-        values = (abi.ScanGrade * len(grades))(*(abi.ScanGrade(*grade[:4]) for grade in grades))
-        balance = np.array([(*grade, 1.0, 1.0, 1.0)[4:7] for grade in grades], np.float32)
+        values = (abi.ScanGrade * len(grades))(*(abi.ScanGrade(*grade) for grade in grades))
+        balance = np.ones((len(grades), 3), np.float32) if balance is None else np.ascontiguousarray(balance, np.float32)
+        if balance.shape != (len(grades), 3):
+            raise PatinaError("balance has three gains for each scan")
         super().__init__(cloud._handle, None if scans is None else scans.ctypes.data, values, balance.ctypes.data, len(grades),
                          blame=(cloud._handle,), create="patina_grade_create_balanced")
+
+
+def gains(cloud: Cloud, scans: np.ndarray, count: int, progress: Progress | None = None) -> np.ndarray:
+    """(count, 3) float32: what multiplies red, green and blue of each scan so that their light agrees where scans overlap. scans:
+    (cloud.count,) uint16. PatinaError for a cloud without colors."""
+    if scans.dtype != np.uint16 or len(scans) != cloud.count or not scans.flags.c_contiguous:
+        raise PatinaError("scans are a uint16 for each point")
+    found = np.ones((count, 3), np.float32)
+    check(library().patina_cloud_balance(cloud._handle, scans.ctypes.data, count, _handle_of(progress), found.ctypes.data), cloud._handle)
+    return found
 
 
 class ScanSet(_Handle):

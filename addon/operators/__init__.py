@@ -7,7 +7,6 @@ from . import (
     add_light,
     addresses,
     analyze,
-    balance,
     clips,
     colors,
     combine,
@@ -33,7 +32,7 @@ from . import (
     world,
 )
 
-_MODULES = (add_light, analyze, balance, clips, colors, import_points, addresses, export_points, combine, convert_points, farm, linked_points, plan,
+_MODULES = (add_light, analyze, clips, colors, import_points, addresses, export_points, combine, convert_points, farm, linked_points, plan,
             points, points_keys, points_tools, preferences, scanner, scans, set_up, shadows, soft_brush, stations, styles, untrusted,
             view_transform, world)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scans of a cloud: listed to be hidden and graded, colored by which a point is of, and balanced where they overlap."""
+"""Scans of a cloud: listed to be hidden and graded, and colored by which a point is of."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..importers import scans
 from ..sync import attributes, edits, scans_of
 from . import points
 
-LOOK = ("gain", "gamma", "saturation", "temperature", "balance", "hide", "solo")
+LOOK = ("gain", "gamma", "saturation", "temperature", "hide", "solo")
 
 
 def refused(obj: Object | None) -> str:
@@ -85,7 +85,7 @@ class PATINA_OT_scans_list(OfScans, Operator):
 def listed(obj: Object, found: scans_of.Scans | None, of: np.ndarray | None) -> None:
     """Brings the object's list up to date."""
     group = obj.patina.points
-    kept = {edits.number_of(item): {name: _value(item, name) for name in LOOK if item.is_property_set(name)} for item in group.scans}
+    kept = {edits.number_of(item): {name: getattr(item, name) for name in LOOK if item.is_property_set(name)} for item in group.scans}
     called = {item.number: item.name for item in group.scans if item.number >= 0}
     told = scans.unpacked(obj.data.get(scans.PROPERTY)) if found is None or found.name == "scan" else []
     numbers = found.numbers if found else (edits.ALL,)
@@ -102,13 +102,8 @@ def listed(obj: Object, found: scans_of.Scans | None, of: np.ndarray | None) -> 
     group.scan = min(group.scan, len(numbers) - 1)
 
 
-def _value(item: bpy.types.PropertyGroup, name: str) -> float | bool | tuple[float, ...]:
-    value = getattr(item, name)
-    return tuple(value) if name == "balance" else value
-
-
 class PATINA_OT_scans_reset(OfScans, Operator):
-    """Show all scans with their original colors"""
+    """Show all scans, and remove their grades"""
 
     bl_idname = "object.patina_scans_reset"
     bl_label = "Reset Scans"

@@ -6,7 +6,7 @@ from __future__ import annotations
 from bpy.props import CollectionProperty
 from bpy.types import PropertyGroup
 
-from .heard import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from .heard import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 
@@ -20,9 +20,6 @@ class PatinaScanProperties(PropertyGroup):
     hide: BoolProperty(name="Hide", override=_OVERRIDE, default=False,
                        description="Hide the points of this scan. They cast no shadow and stay in exports")
     solo: BoolProperty(name="Solo", override=_OVERRIDE, default=False, description="Draw only the scans that are solo")
-    balance: FloatVectorProperty(
-        name="Balance", override=_OVERRIDE, size=3, default=(1.0, 1.0, 1.0), min=0.0, soft_max=4.0, max=1000.0, precision=3,
-        description="Multiplies the light of red, green and blue, as Balance Colors found, while Balance is on")
     gain: FloatProperty(name="Gain", override=_OVERRIDE, default=1.0, min=0.0, soft_max=4.0, max=1000.0, precision=3,
                         description="Exposure of the scan's colors")
     gamma: FloatProperty(name="Gamma", override=_OVERRIDE, default=1.0, min=0.1, soft_min=0.25, soft_max=4.0, max=10.0, precision=3,
@@ -40,8 +37,8 @@ class PatinaPointsProperties(PropertyGroup):
     scans: CollectionProperty(type=PatinaScanProperties, name="Scans", override=_OVERRIDE,
                               description="Scans of the points, with visibility and color grading")
     use_balance: BoolProperty(
-        name="Balance", override=_OVERRIDE, default=False,
-        description="Bring the colors of the scans to each other, by what Balance Colors found where they overlap")
+        name="Balance Scans", override=_OVERRIDE, default=True,
+        description="Match exposure and white balance of the scans where they overlap")
     scan: IntProperty(name="Scan", override=_OVERRIDE, default=0, min=0, options={'HIDDEN'}, description="Active scan in the list")
     class_number: IntProperty(name="Class", override=_OVERRIDE, default=2, min=0, max=255,
                               description="LAS class to select: 2 ground, 6 building, 7 noise")

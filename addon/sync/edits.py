@@ -24,6 +24,7 @@ import bpy
 import numpy as np
 
 from .. import native
+from ..native import points
 from ..native.points import Field, Grade, Mask
 
 PROPERTY = "patina_points"  # of an object
@@ -36,8 +37,9 @@ Handle = TypeVar("Handle", Mask, Grade, Field)
 _KEPT = 4  # masks and grades of a cloud, and unpacked edits: those of the last undo steps come back at once
 
 Bits = np.ndarray  # (count + 7) // 8 uint8, point i is bit i % 8 of byte i // 8
-Scan = tuple[float, ...]  # gain, gamma, saturation, temperature, and what balances red, green and blue
-NEUTRAL: Scan = (1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
+Scan = tuple[float, ...]  # gain, gamma, saturation, temperature
+NEUTRAL: Scan = (1.0, 1.0, 1.0, 0.0)
+MOST_BALANCED = 1 << 27  # points: balancing takes as much memory as colors do
 ALL = -1  # the number of the one scan of a cloud that knows none
 
 
@@ -76,6 +78,7 @@ class State:
     packed: str = ""
     grades: tuple[tuple[int, Scan], ...] = ()  # by the scans' numbers
     hidden: tuple[int, ...] = ()
+    balanced: bool = False  # scans are brought to each other; this alone is no edit
 
     def __bool__(self) -> bool:
         return bool(self.packed or self.grades or self.hidden)
@@ -126,10 +129,11 @@ def packed_of(obj: bpy.types.Object) -> str:
 def state_of(obj: bpy.types.Object) -> State:
     """Of an object with points, evaluated or not."""
     group = obj.patina.points
-    grades = tuple((number_of(item), graded) for item in group.scans if (graded := grade_of_item(item, group.use_balance)) != NEUTRAL)
+    grades = tuple((number_of(item), graded) for item in group.scans if (graded := grade_of_item(item)) != NEUTRAL)
     solo = any(item.solo for item in group.scans)
     hidden = tuple(number_of(item) for item in group.scans if item.hide or solo and not item.solo)
-    return State(packed_of(obj) if obj.patina.linked_file else "", grades, hidden)
+    balanced = group.use_balance and obj.patina.colors.source == 'OWN'
+    return State(packed_of(obj) if obj.patina.linked_file else "", grades, hidden, balanced)
 
 
 def number_of(item: bpy.types.PropertyGroup) -> int:
@@ -138,9 +142,8 @@ def number_of(item: bpy.types.PropertyGroup) -> int:
     return item.number if item.number >= 0 or not last.isdigit() else int(last)
 
 
-def grade_of_item(item: bpy.types.PropertyGroup, balanced: bool) -> Scan:
-    own = (item.gain, item.gamma, item.saturation, item.temperature)
-    return (*own, *(item.balance if balanced else NEUTRAL[4:]))
+def grade_of_item(item: bpy.types.PropertyGroup) -> Scan:
+    return (item.gain, item.gamma, item.saturation, item.temperature)
 
 
 def unpacked(packed: str) -> Edits | None:
@@ -206,6 +209,7 @@ _lock = threading.Lock()
 _unpacked: OrderedDict[str, Edits] = OrderedDict()
 _handles: weakref.WeakKeyDictionary[native.Cloud, dict[tuple, Mask | Grade | Field]] = weakref.WeakKeyDictionary()
 _scans: weakref.WeakKeyDictionary[native.Cloud, np.ndarray | None] = weakref.WeakKeyDictionary()
+_gains: weakref.WeakKeyDictionary[native.Cloud, tuple[tuple, np.ndarray]] = weakref.WeakKeyDictionary()
 
 
 def mask_of(cloud: native.Cloud, state: State) -> Mask | None:
@@ -242,15 +246,33 @@ def has_selection(cloud: native.Cloud, state: State) -> bool:
 
 def grade_of(cloud: native.Cloud, state: State) -> Grade | None:
     """Any thread. None where there is nothing to grade."""
-    if not state.grades or not cloud.has_colors or cloud.stream:
+    balanced = state.balanced and 1 < len(cloud.scan_numbers) and cloud.count <= MOST_BALANCED
+    if not (state.grades or balanced) or not cloud.has_colors or cloud.stream:
         return None
     scans, known = scans_of(cloud), dict(state.grades)
     if cloud.scan_file and scans is None:
         return None
     grades = [known.get(number, NEUTRAL) for number in cloud.scan_numbers] if scans is not None else [known.get(ALL, NEUTRAL)]
-    if all(grade == NEUTRAL for grade in grades):
+    gains = gains_of(cloud) if balanced and scans is not None else np.ones((len(grades), 3), np.float32)
+    if all(grade == NEUTRAL for grade in grades) and (gains == 1.0).all():
         return None
-    return keep(cloud, ("grade", tuple(grades), cloud.scan_stamp, cloud.color_stamp), lambda: Grade(cloud, scans, grades))
+    return keep(cloud, ("grade", tuple(grades), gains.tobytes(), *_state_of(cloud)), lambda: Grade(cloud, scans, grades, gains))
+
+
+def _state_of(cloud: native.Cloud) -> tuple:
+    """What grades and gains follow from: an analysis gives points colors, and leaves out points that are not trusted."""
+    return cloud.scan_stamp, cloud.color_stamp, cloud.has_shapes
+
+
+def gains_of(cloud: native.Cloud) -> np.ndarray:
+    """(scans, 3): what multiplies the light of each so that scans agree where they overlap. Any thread. A second for a large cloud, once."""
+    with _lock:
+        stamp, gains = _gains.get(cloud, (None, None))
+    if stamp != _state_of(cloud):
+        stamp, gains = _state_of(cloud), points.gains(cloud, scans_of(cloud), len(cloud.scan_numbers))
+        with _lock:
+            _gains[cloud] = (stamp, gains)
+    return gains
 
 
 def scans_of(cloud: native.Cloud) -> np.ndarray | None:

@@ -96,7 +96,7 @@ class PATINA_UL_scans(UIList):
         side = row.row()
         side.alignment = 'RIGHT'
         side.active = False
-        graded = edits.grade_of_item(item, False) != edits.NEUTRAL
+        graded = edits.grade_of_item(item) != edits.NEUTRAL
         side.label(text=f"{'graded  ' * graded}{item.count}")
         row.prop(item, "solo", text="", icon='SOLO_ON' if item.solo else 'SOLO_OFF', emboss=False)
         row.prop(item, "hide", text="", icon='HIDE_ON' if item.hide else 'HIDE_OFF', emboss=False)
@@ -113,17 +113,14 @@ class PATINA_PT_scans(SidebarPanel, Panel):
     def draw(self, context: Context) -> None:
         layout, obj = self.layout, context.object
         group = obj.patina.points
+        row = layout.row()
+        row.active = obj.patina.colors.source == 'OWN'
+        row.prop(group, "use_balance")
         layout.operator("object.patina_scans_color")
         layout.operator("object.patina_scans_list")
         if not group.scans:
             return
         layout.template_list("PATINA_UL_scans", "", group, "scans", group, "scan", rows=3)
-        row = layout.row(align=True)
-        row.active = obj.patina.colors.source == 'OWN'
-        row.operator("object.patina_scans_balance")
-        inner = row.row(align=True)
-        inner.active = any(tuple(item.balance) != (1.0, 1.0, 1.0) for item in group.scans)
-        inner.prop(group, "use_balance", toggle=True)
         if group.scan < len(group.scans):
             self._draw_grade(obj, group.scans[group.scan])
         layout.operator("object.patina_scans_reset")

@@ -14,14 +14,15 @@
 #include <string.h>
 
 // By the root of the light, since gamma and sRGB are steep where it is dark: a step is at most 0.2 of the 8 bits' with a gamma of 2.
-enum { STEPS = 1 << 14, MOST_SCANS = 1024 };
+enum { STEPS = 1 << 14, MOST_SCANS = 65535 };
 
 static const float luma[3] = {0.2126f, 0.7152f, 0.0722f};
 
 struct tone {
     int same; // as it was
     float factor[3], saturation, power;
-    uint8_t *encode; // STEPS, of 8-bit colours
+    uint8_t *encode; // STEPS, of 8-bit colours; tones of one power share it
+    int shares;      // another tone's
 };
 
 struct grading {
@@ -140,11 +141,16 @@ static int set_tones(struct grading *grading, const patina_scan_grade *grades, c
     for (int i = 0; i < 256; i++)
         grading->linear[i] = (float)pt_linear_of_srgb(i / 255.0);
     grading->tones = calloc(grading->tone_count, sizeof *grading->tones);
+    const struct tone *shared = NULL; // the last that has its own
     for (uint32_t i = 0; grading->tones && i < grading->tone_count; i++) {
         struct tone *tone = &grading->tones[i];
         set_factors(&grades[i], balance ? balance + 3 * (size_t)i : NULL, tone);
         if (tone->same || grading->cloud->color_format != PT_COLOR_SRGB8)
             continue;
+        tone->encode = shared && tone->power == shared->power ? shared->encode : NULL;
+        if ((tone->shares = tone->encode != NULL))
+            continue;
+        shared = tone;
         tone->encode = malloc(STEPS);
         if (!tone->encode)
             return 0;
@@ -198,7 +204,8 @@ static int make_grade(const patina_cloud *cloud, const uint16_t *scans, const pa
     if (!good)
         patina_grade_destroy(grade);
     for (uint32_t i = 0; grading.tones && i < count; i++)
-        free(grading.tones[i].encode);
+        if (!grading.tones[i].shares)
+            free(grading.tones[i].encode);
     free(grading.tones);
     pt_pool_destroy(pool);
     *out = good ? grade : NULL;

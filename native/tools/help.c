@@ -91,6 +91,7 @@ static const struct topic {
      "  --ramp-colors NAME                 viridis, grey, heat, spectrum, relief, diverging or classes (viridis)\n"
      "  --attribute NAME                   the scalar that --effect contour_source=attribute follows (the ramp's)\n"
      "  --exposure STOPS, --contrast C     of the points' colors, before light\n"
+     "  --no-balance                       scans keep their own exposure and white balance\n"
      "  --opacity X[,X...]                 0 to 1, of each FILE; the last counts for those behind it\n"
      "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"
      "  --layer-distance D                 least distance of two surfaces, world units (by the spacing)\n"

@@ -19,6 +19,7 @@ struct job {
     patina_cloud **clouds; // options.file_count, as fields, of those that have one
     patina_field **fields;
     struct tool_scans *scans; // beside them
+    patina_grade **grades;
     patina_mesh *meshes[TOOL_MESHES];
     patina_scene *scene;
     patina_frame *frame;
@@ -41,6 +42,9 @@ static void destroy(struct job *job)
         patina_cloud_destroy(job->clouds[i]);
     for (int i = 0; job->scans && i < job->options.file_count; i++)
         patina_scans_destroy(job->scans[i].made);
+    for (int i = 0; job->grades && i < job->options.file_count; i++)
+        patina_grade_destroy(job->grades[i]);
+    free(job->grades);
     free(job->fields);
     for (int i = 0; i < job->options.mesh_count; i++)
         patina_mesh_destroy(job->meshes[i]);
@@ -118,7 +122,9 @@ static int load_clouds(struct job *job)
     job->clouds = calloc((size_t)options->file_count + 1, sizeof *job->clouds);
     job->scans = calloc((size_t)options->file_count + 1, sizeof *job->scans);
     job->fields = calloc((size_t)options->file_count + 1, sizeof *job->fields);
-    int code = job->clouds && job->scans && job->fields ? patina_progress_create(&job->progress) : PATINA_ERROR_MEMORY;
+    job->grades = calloc((size_t)options->file_count + 1, sizeof *job->grades);
+    int code = job->clouds && job->scans && job->fields && job->grades ? patina_progress_create(&job->progress)
+                                                                       : PATINA_ERROR_MEMORY;
     if (!code)
         code = patina_scene_create(&job->scene);
     if (code)
@@ -145,6 +151,8 @@ static int load_clouds(struct job *job)
                                &numbers, &stations, &job->scans[i]);
         if (!code)
             code = analyse(job, job->clouds[i], options->files[i], &stations);
+        if (!code)
+            code = tool_balance(&stations, &options->color, job->clouds[i], job->progress, &job->grades[i]);
         if (!code && options->pass == PATINA_PASS_DISAGREEMENT && !job->scans[i].made)
             code = tool_make_scans(&stations, options->files[i], job->clouds[i], &job->scans[i].made);
         tool_free_stations(&stations);
@@ -160,6 +168,7 @@ static int load_clouds(struct job *job)
         if (options->opacity_count)
             style.transparency = (float)(1 - options->opacity[i < options->opacity_count ? i : options->opacity_count - 1]);
         style.scans = job->scans[i].made;
+        style.grade = job->grades[i];
         if (options->range_culling > 0.0 && !job->scans[i].directed)
             tool_say("warning: %s does not say in which direction its scans were taken: none is left out", options->files[i]);
         code = tool_set_color(&options->color, job->clouds[i], table, &style);

@@ -133,6 +133,32 @@ int tool_make_scans(const struct tool_stations *stations, const char *path, cons
     return PATINA_OK;
 }
 
+int tool_balance(const struct tool_stations *stations, const struct tool_color *color, const patina_cloud *cloud,
+                 patina_progress *progress, patina_grade **out)
+{
+    patina_cloud_info info = {.struct_size = sizeof info};
+    uint32_t scans = 0, balanced = 0;
+    int code = patina_cloud_get_info(cloud, &info);
+    if (code || !stations->told || !info.has_colors || color->source != PATINA_COLOR_OWN || color->unbalanced)
+        return code;
+    for (uint64_t i = 0; i < info.count; i++)
+        scans = stations->station[i] < UINT16_MAX && stations->station[i] >= scans ? stations->station[i] + 1u : scans;
+    if (scans < 2)
+        return PATINA_OK;
+    float *gains = malloc(3 * sizeof *gains * scans);
+    patina_scan_grade *grades = malloc(sizeof *grades * scans);
+    code = gains && grades ? patina_cloud_balance(cloud, stations->station, scans, progress, gains) : PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < scans && !code; i++) {
+        grades[i] = (patina_scan_grade){1.0f, 1.0f, 1.0f, 0.0f};
+        balanced += gains[3 * i] != 1.0f || gains[3 * i + 1] != 1.0f || gains[3 * i + 2] != 1.0f;
+    }
+    if (!code && balanced)
+        code = patina_grade_create_balanced(cloud, stations->station, grades, gains, scans, out);
+    free(gains);
+    free(grades);
+    return code;
+}
+
 void tool_free_stations(struct tool_stations *stations)
 {
     free(stations->places);

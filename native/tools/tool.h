@@ -64,7 +64,8 @@ struct tool_color {
     float least_trust;
     patina_clip clips[TOOL_CLIPS];
     int clip_count;
-    float tint[4]; // and width; 0: none
+    float tint[4];  // and width; 0: none
+    int unbalanced; // scans keep the light that they were taken with
 };
 
 // Soft points.
@@ -194,6 +195,9 @@ void tool_describe_stations(const struct tool_stations *stations, patina_analysi
 void tool_use_grid(const struct tool_stations *stations, const char *path, patina_analysis_desc *desc);
 // Which of its scans each point is of; or a line of standard error says that this is not known. A patina_error.
 int tool_make_scans(const struct tool_stations *stations, const char *path, const patina_cloud *cloud, patina_scans **out);
+// Colors of the cloud whose scans are balanced (SPEC 11); *out stays NULL where nothing is to be balanced. A patina_error.
+int tool_balance(const struct tool_stations *stations, const struct tool_color *color, const patina_cloud *cloud,
+                 patina_progress *progress, patina_grade **out);
 void tool_free_stations(struct tool_stations *stations);
 
 extern const char *const tool_kinds[6]; // patina_kind

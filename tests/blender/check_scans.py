@@ -184,44 +184,56 @@ def overlap(count, rng, outliers=0.1):
 
 
 def test_known_gains_are_found():
-    """Of four scans in a row, with noise and things that moved, within 2 %; the mean stays, and a scan apart is told and left."""
-    from patina.operators import balance
+    """Of four scans in a row, with noise and things that moved, within 2 %; their mean is 1, and a scan apart is left."""
+    from patina import native
+    from patina.native.points import gains
     rng = np.random.default_rng(24)
     places, light, of = overlap(4, rng)
-    gains = np.array([(1, 1, 1), (0.6, 0.7, 0.8), (1.2, 1.0, 0.9), (0.9, 1.3, 1.1)])
-    exposed = light * gains[of]
+    known = np.array([(1, 1, 1), (0.6, 0.7, 0.8), (1.2, 1.0, 0.9), (0.9, 1.3, 1.1)])
     apart = places[of == 0] + (0, 100, 0)
-    found = balance.find(np.concatenate([places, apart]), np.concatenate([exposed, 0.5 * light[of == 0]]),
-                         np.concatenate([of, np.full(len(apart), 4)]), 5)
-    check(found.alone == [4], f"{found.alone}")
-    check_close(found.gains[4], (1, 1, 1), 1e-9, "apart")
-    left = found.gains[:4] * gains
+    every = np.concatenate([places, apart]).astype(np.float32)
+    exposed = np.concatenate([light * known[of], 0.5 * light[of == 0]]).astype(np.float32)
+    scans = np.concatenate([of, np.full(len(apart), 4)]).astype(np.uint16)
+    found = gains(native.Cloud(every, None, exposed), scans, 5)
+    check_close(found[4], (1, 1, 1), 1e-9, "apart")
+    left = found[:4] * known
     check_close(left / left[0], np.ones((4, 3)), 0.02, "what is left of the gains")
-    check_close(np.log(found.gains[:4]).mean(axis=0), (0, 0, 0), 1e-9, "the mean")
-    none = balance.find(apart, light[of == 0], np.zeros(len(apart), int), 1)
-    check(none.alone == [0] and (none.gains == 1).all(), "one scan")
-    none = balance.find(np.full((10, 3), np.nan), np.full((10, 3), np.nan), np.arange(10) % 2, 2)
-    check(none.alone == [0, 1] and (none.gains == 1).all(), "no numbers")
+    check_close(found[:4].mean(axis=0), (1, 1, 1), 1e-5, "the mean")
+    try:
+        gains(native.Cloud(every, None, None), scans, 5)
+    except native.PatinaError as error:
+        check("no colors" in str(error), str(error))
+    else:
+        check(False, "gains of no colors")
 
 
 def check_balance(link):
-    """In the picture: both halves of a wall that was photographed twice are as bright."""
-    obj = colored_pair(f"balance_{link}.ply", ((1, 1, 1), (0.6, 0.8, 1.3)), link)
-    before = render()["Combined"]
-    bpy.ops.object.patina_scans_balance()
+    """In the image: both halves of a wall that was photographed twice are as bright by default, as listing or not the scans."""
+    known = np.array(((1, 1, 1), (0.6, 0.8, 1.3)))
+    obj = colored_pair(f"balance_{link}.ply", known, link)
     group = obj.patina.points
-    check(group.use_balance and len(group.scans) == 2, "it is on")
-    ratio = np.array(group.scans[1].balance) / np.array(group.scans[0].balance)
-    check_close(ratio * (0.6, 0.8, 1.3), (1, 1, 1), 0.02, "gains")
+    check(group.use_balance, "it is on")
     after = render()["Combined"]
-    lit = before[..., 3] > 0
-    right, left = lit & (np.arange(64) >= 48), lit & (np.arange(64) < 24)
-    for side, index in ((left, 0), (right, 1)):
-        check_close(after[side][:, :3], before[side][:, :3] * np.array(group.scans[index].balance), 0.01, "its gains in the picture")
     group.use_balance = False
-    check((render()["Combined"] == before).all(), "off it is as before")
+    before = render()["Combined"]
     group.use_balance = True
     check((render()["Combined"] == after).all(), "on again")
+    lit = before[..., 3] > 0
+    right, left = lit & (np.arange(64) >= 48), lit & (np.arange(64) < 24)
+    gains = [np.median(after[side][:, :3] / before[side][:, :3], axis=0) for side in (left, right)]
+    check_close(gains[1] * known[1] / gains[0], (1, 1, 1), 0.02, "gains")
+    check_close(np.mean(gains, axis=0), (1, 1, 1), 0.02, "the mean")
+    for side, gain in zip((left, right), gains, strict=True):
+        check_close(after[side][:, :3], before[side][:, :3] * gain, 0.01, "one gain for all of a scan")
+    bpy.ops.object.patina_scans_list()
+    check((render()["Combined"] == after).all(), "listed")
+    group.scans[1].gain = 0.5
+    half = render()["Combined"]
+    check_close(half[right][:, :3], 0.5 * after[right][:, :3], 0.01, "graded on top")
+    obj.patina.colors.source = 'FIXED'
+    fixed = render()["Combined"]
+    group.use_balance = False
+    check((render()["Combined"] == fixed).all(), "nothing to balance of one color")
 
 
 def test_balance():
@@ -232,14 +244,10 @@ def test_balance_of_links():
     check_balance(True)
 
 
-def test_balance_needs_colors():
-    pair(False)
-    try:
-        bpy.ops.object.patina_scans_balance()
-    except RuntimeError as error:
-        check("has no colors to balance" in str(error), str(error))
-    else:
-        check(False, "balanced without colors")
+def test_scans_without_colors():
+    """They have nothing to balance, and are drawn."""
+    obj = pair(False)
+    check(obj.patina.points.use_balance and len(drawn(render())) > 60, "drawn")
 
 
 def test_range_images():

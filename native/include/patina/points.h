@@ -33,7 +33,7 @@ typedef struct patina_scan_grade {
 } patina_scan_grade;
 
 // A cloud's own colours, each point's changed by the grade of its scan. scans: of each point in the given order, info.count; NULL = all
-// are of scan 0. Scans from `count` on (1..1024 grades) stay as they are. As much memory as the cloud's colours take; given to scenes by
+// are of scan 0. Scans from `count` on (1..65535 grades) stay as they are. As much memory as the cloud's colours take; given to scenes by
 // style.grade, where color_source is OWN. PATINA_ERROR_EMPTY for a cloud without colours. After patina_cloud_set_colors make another.
 PATINA_API int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
                                    uint32_t count, patina_grade **out);
@@ -41,6 +41,14 @@ PATINA_API int patina_grade_create(const patina_cloud *cloud, const uint16_t *sc
 PATINA_API int patina_grade_create_balanced(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
                                             const float *balance, uint32_t count, patina_grade **out);
 PATINA_API void patina_grade_destroy(patina_grade *grade);
+// Finds by how much the light of scans differs where they overlap, as with other exposures and white balances (SPEC 11), and writes what to
+// multiply it by: red, green and blue of each of `count` scans (1..65535), for patina_grade_create_balanced. The gains of scans that
+// overlap have the mean 1; each is 0.25..4. 1 for a scan that overlaps no other one, and where no color tells. scans: of each point in the
+// given order, info.count; points of scans from `count` on do not count. Untrusted points of analysed clouds neither. Takes about a second
+// at most, whatever the cloud; 20 bytes a point of 2 million meanwhile, of more than 64 million a 32nd of the points. progress may be NULL.
+// Any number of threads gives the same bits. PATINA_ERROR_EMPTY for a cloud without colors.
+PATINA_API int patina_cloud_balance(const patina_cloud *cloud, const uint16_t *scans, uint32_t count, patina_progress *progress,
+                                    float *gains);
 
 // ---- scans: which range image each point is of -----------------------------------------------------------------------
 
