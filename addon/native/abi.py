@@ -91,14 +91,14 @@ class CloudInfo(Descriptor):
                 ("has_classes", c_uint32), ("scalar_range", c_float * 2), ("class_bits", c_uint32 * 8),
                 ("has_shapes", c_uint32), ("normals_oriented", c_uint32), ("estimated_normals", c_uint64),
                 ("kinds", c_uint64 * 6), ("seen_through", c_uint64), ("packed", c_uint32), ("numbered", c_uint32),
-                ("packed_error", c_double), ("trusts", c_uint64 * 16), ("trust_default", c_double)]
+                ("packed_error", c_double), ("trusts", c_uint64 * 16), ("trust_default", c_double), ("uncolored", c_uint64)]
 
 
 class AnalysisDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("neighbours", c_uint32), ("threads", c_uint32), ("keep_normals", c_uint32),
                 ("station_count", c_uint32), ("stations", c_void_p), ("station", Array), ("free_space", c_uint32),
                 ("row", Array), ("column", Array), ("grid", c_uint32), ("scan", Array), ("direction_count", c_uint32),
-                ("directions", c_void_p), ("trust_features", c_void_p)]
+                ("directions", c_void_p), ("trust_features", c_void_p), ("keep_colors", c_uint32)]
 
 
 class Neighbourhoods(Descriptor):

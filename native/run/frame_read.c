@@ -4,6 +4,7 @@
 
 #include "shown.h"
 #include "scene/paged.h"
+#include "scene/uncolored.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -26,53 +27,6 @@ static const struct {
     [PATINA_PASS_DENSITY] = {PT_PLANE_DENSITY, 1, "DENSITY"},
     [PATINA_PASS_DISAGREEMENT] = {PT_PLANE_DISAGREEMENT, 1, "DISAGREEMENT"},
 };
-
-int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size)
-{
-    if (pass >= PATINA_PASS_COUNT)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: no pass %u", pass);
-    if (!frame->shown.picture_valid || !(frame->shown.passes >> pass & 1u))
-        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read: no %s pass was rendered", pass_table[pass].name);
-    size_t expected = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels * sizeof *pixels;
-    if (size != expected)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT,
-                       "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu", pass_table[pass].name,
-                       frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, expected, size);
-    const uint32_t known = 1u << PATINA_PASS_TRUST | 1u << PATINA_PASS_THICKNESS | 1u << PATINA_PASS_DENSITY |
-                           1u << PATINA_PASS_DISAGREEMENT;
-    if ((pass == PATINA_PASS_SHADOW && frame->shown.all_lit) || (pass == PATINA_PASS_LINE && !frame->shown.has_lines) ||
-        (known & ~frame->shown.assessed) >> pass & 1u) { // no plane
-        for (size_t i = 0; i < size / sizeof *pixels; i++)
-            pixels[i] = pass == PATINA_PASS_SHADOW ? 1.0f : 0.0f;
-        return PATINA_OK;
-    }
-    int error = frame->device->ops->buffer_read(frame->device, &frame->planes.at[pass_table[pass].plane][0], 0, pixels, size);
-    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
-}
-
-int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size)
-{
-    static const enum pt_plane planes[] = {[PATINA_PASS_COMBINED] = PT_PLANE_LAYER_COMBINED,
-                                           [PATINA_PASS_DEPTH] = PT_PLANE_LAYER_DEPTH,
-                                           [PATINA_PASS_NORMAL] = PT_PLANE_LAYER_NORMALS};
-    if (pass > PATINA_PASS_NORMAL || !layer || layer > PATINA_MAX_LAYERS)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: no pass %u of a layer %u", pass, layer);
-    if (!frame->keys_valid || !(frame->shown.layer_passes >> pass & 1u) || layer > frame->shown.layer_most)
-        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_layer: no %s pass of layer %u was asked for",
-                       pass_table[pass].name, layer);
-    size_t count = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels;
-    if (size != count * sizeof *pixels)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT,
-                       "patina_frame_read_layer: %s is %u x %u x %u floats; got %zu bytes", pass_table[pass].name,
-                       frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, size);
-    if (layer > frame->layer_count) { // peeling ended before
-        for (size_t i = 0; i < count; i++)
-            pixels[i] = pass == PATINA_PASS_DEPTH ? INFINITY : 0.0f;
-        return PATINA_OK;
-    }
-    int error = frame->device->ops->buffer_read(frame->device, &frame->planes.at[planes[pass]][layer - 1], 0, pixels, size);
-    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
-}
 
 // The keys of the picture, whose rows are parts of the plane's. All rows are read by one call: each call waits for an OpenGL device.
 static int read_crop(const struct patina_frame *frame, const char *call, uint64_t *keys)
@@ -102,6 +56,80 @@ static int read_plane(const struct patina_frame *frame, const char *call, uint64
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "%s: %u x %u keys; got %zu bytes", call, frame->shown.crop[2],
                        frame->shown.crop[3], size);
     return read_crop(frame, call, keys);
+}
+
+// Points that were measured without a color, and show their neighbors', read 0.5 in SOURCE.
+static int mark_uncolored(const struct patina_frame *frame, float *pixels)
+{
+    const size_t count = (size_t)frame->shown.crop[2] * frame->shown.crop[3];
+    uint32_t instance = 0, slot;
+    int some = 0;
+    for (uint32_t i = 0; i < frame->key_ids.count; i++) {
+        const struct patina_cloud *cloud = pt_numbering_cloud(&frame->key_ids, i);
+        some |= cloud && cloud->info.uncolored;
+    }
+    if (!some || !frame->keys_valid)
+        return PATINA_OK;
+    uint64_t *keys = malloc(count * sizeof *keys + 1);
+    int error = keys ? read_plane(frame, "patina_frame_read", keys, count * sizeof *keys)
+                     : pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read: out of memory");
+    for (size_t i = 0; i < count && !error; i++) {
+        if (pixels[i] != 1.0f || !pt_numbering_find(&frame->key_ids, (uint32_t)keys[i], &instance, &slot))
+            continue;
+        const struct patina_cloud *cloud = pt_numbering_cloud(&frame->key_ids, instance);
+        if (cloud && cloud->info.uncolored && cloud->shapes[slot] & PT_SHAPE_UNCOLORED)
+            pixels[i] = 0.5f;
+    }
+    free(keys);
+    return error;
+}
+
+int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size)
+{
+    if (pass >= PATINA_PASS_COUNT)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: no pass %u", pass);
+    if (!frame->shown.picture_valid || !(frame->shown.passes >> pass & 1u))
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read: no %s pass was rendered", pass_table[pass].name);
+    size_t expected = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels * sizeof *pixels;
+    if (size != expected)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT,
+                       "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu", pass_table[pass].name,
+                       frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, expected, size);
+    const uint32_t known = 1u << PATINA_PASS_TRUST | 1u << PATINA_PASS_THICKNESS | 1u << PATINA_PASS_DENSITY |
+                           1u << PATINA_PASS_DISAGREEMENT;
+    if ((pass == PATINA_PASS_SHADOW && frame->shown.all_lit) || (pass == PATINA_PASS_LINE && !frame->shown.has_lines) ||
+        (known & ~frame->shown.assessed) >> pass & 1u) { // no plane
+        for (size_t i = 0; i < size / sizeof *pixels; i++)
+            pixels[i] = pass == PATINA_PASS_SHADOW ? 1.0f : 0.0f;
+        return PATINA_OK;
+    }
+    int error = frame->device->ops->buffer_read(frame->device, &frame->planes.at[pass_table[pass].plane][0], 0, pixels, size);
+    error = error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+    return error || pass != PATINA_PASS_SOURCE ? error : mark_uncolored(frame, pixels);
+}
+
+int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size)
+{
+    static const enum pt_plane planes[] = {[PATINA_PASS_COMBINED] = PT_PLANE_LAYER_COMBINED,
+                                           [PATINA_PASS_DEPTH] = PT_PLANE_LAYER_DEPTH,
+                                           [PATINA_PASS_NORMAL] = PT_PLANE_LAYER_NORMALS};
+    if (pass > PATINA_PASS_NORMAL || !layer || layer > PATINA_MAX_LAYERS)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: no pass %u of a layer %u", pass, layer);
+    if (!frame->keys_valid || !(frame->shown.layer_passes >> pass & 1u) || layer > frame->shown.layer_most)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_layer: no %s pass of layer %u was asked for",
+                       pass_table[pass].name, layer);
+    size_t count = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels;
+    if (size != count * sizeof *pixels)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT,
+                       "patina_frame_read_layer: %s is %u x %u x %u floats; got %zu bytes", pass_table[pass].name,
+                       frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, size);
+    if (layer > frame->layer_count) { // peeling ended before
+        for (size_t i = 0; i < count; i++)
+            pixels[i] = pass == PATINA_PASS_DEPTH ? INFINITY : 0.0f;
+        return PATINA_OK;
+    }
+    int error = frame->device->ops->buffer_read(frame->device, &frame->planes.at[planes[pass]][layer - 1], 0, pixels, size);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
 static int fail_to_number(const struct patina_frame *frame, int error, const char *call)

@@ -11,6 +11,7 @@
 #include "trust.h"
 #include "paged.h"
 #include "page_sums.h"
+#include "uncolored.h"
 #include "parts.h"
 #include "base/progress.h"
 #include "shared/words.h"
@@ -454,6 +455,21 @@ static int vote_sides(struct walk *walk, struct pt_pool *pool)
     return error;
 }
 
+static int lend_colors(struct walk *walk, struct pt_pool *pool)
+{
+    struct pt_uncolored job = {.cloud = walk->cloud,
+                               .tree = &walk->tree,
+                               .shapes = walk->out->shapes,
+                               .least_level = pt_default_level(walk->out->trusts),
+                               .keep = walk->desc->keep_colors != 0,
+                               .store = walk->store,
+                               .progress = walk->progress};
+    const int error = pt_uncolored_find(&job, pool);
+    walk->out->colors = job.colors;
+    walk->out->uncolored = job.count;
+    return error;
+}
+
 static int compute(struct walk *walk, struct pt_pool *pool)
 {
     const patina_cloud *cloud = walk->cloud;
@@ -501,6 +517,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     pt_trust_destroy(&walk->trust);
     pt_neighbours_destroy(&walk->coarse);
     error = error ? error : vote_sides(walk, pool);
+    error = error ? error : lend_colors(walk, pool);
     pt_neighbours_destroy(&walk->tree);
     if (error)
         return error;
@@ -552,7 +569,8 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
                         .progress = progress,
                         .k = desc->neighbours ? desc->neighbours : NEIGHBOURS,
                         .given = cloud->info.has_normals && cloud->info.normals_oriented != PATINA_SIDES_VOTED};
-    *out = (struct pt_analysis){.store = store, .slots = cloud->slots};
+    *out = (struct pt_analysis){
+        .store = store, .slots = cloud->slots, .color_bytes = pt_color_bytes(cloud), .keeps_colors = desc->keep_colors != 0};
     struct pt_pool *pool = pt_pool_create(pt_pool_threads_for(desc->threads, cloud->info.count), 0);
     if (pool && store)
         pt_pool_watch(pool, pt_store_look, store);
@@ -572,6 +590,7 @@ void pt_analysis_free(struct pt_analysis *analysis)
     pt_store_free(analysis->store, analysis->surfels, analysis->slots * 4);
     pt_store_free(analysis->store, analysis->shapes, analysis->slots * 4);
     free(analysis->chunks);
+    pt_store_free(analysis->store, analysis->colors, analysis->color_bytes);
     pt_sights_free(&analysis->sights);
     *analysis = (struct pt_analysis){0};
 }
@@ -585,6 +604,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     if (pt_cloud_settle_spacing(&next))
         return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "taking an analysis: out of memory");
     cloud->info.bytes += cloud->shapes ? 0 : cloud->slots * 4;
+    cloud->info.bytes += analysis->colors && cloud->mapped >> PT_ARRAY_COLORS & 1u ? analysis->color_bytes : 0;
     cloud->info.bytes += cloud->sights.bytes ? 0 : analysis->sights.bytes;
     cloud->info.spacing = next.info.spacing;
     cloud->info.spacing_min = next.info.spacing_min;
@@ -610,6 +630,14 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     if (cloud->clusters)
         pt_clusters_make(cloud);
     cloud->beside = pt_shapes_beside(cloud);
+    if (analysis->colors) {
+        pt_pages_free(cloud->colors, pt_color_bytes(cloud));
+        cloud->colors = analysis->colors;
+        cloud->mapped &= ~(1u << PT_ARRAY_COLORS);
+        atomic_fetch_add(&cloud->alive->colors, 1);
+    }
+    cloud->info.uncolored = analysis->uncolored;
+    cloud->keeps_colors = analysis->keeps_colors;
     cloud->spacing_base = analysis->spacing_base;
     *analysis = (struct pt_analysis){0};
     atomic_store(&cloud->alive->fingerprint, 0);

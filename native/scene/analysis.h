@@ -16,6 +16,10 @@ struct pt_analysis {
     double spacing_base;
     uint64_t estimated, kinds[6], seen_through, trusts[PT_TRUST_LEVELS];
     int oriented;
+    void *colors; // slots, of uncolored points their neighbors'; NULL: as the cloud's
+    size_t color_bytes;
+    int keeps_colors;
+    uint64_t uncolored;
     struct pt_sights sights; // where free space is asked for
 };
 

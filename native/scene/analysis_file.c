@@ -43,6 +43,7 @@ static void close_cloud(struct patina_cloud *cloud, const struct pt_store *store
     for (uint32_t i = 0; store && i < store->count; i++) {
         cloud->surfels = store->arrays[i].pages == cloud->surfels ? NULL : cloud->surfels;
         cloud->shapes = store->arrays[i].pages == cloud->shapes ? NULL : cloud->shapes;
+        cloud->colors = store->arrays[i].pages == cloud->colors ? NULL : cloud->colors;
     }
     cloud->chunks = NULL;
     patina_cloud_destroy(cloud);

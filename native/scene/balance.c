@@ -25,16 +25,16 @@ enum {
     ROUNDS = 8              // of reweighting
 };
 
-#define DARK 0.002 // light: below there is noise
-#define BRIGHT 0.98 // from here to 1 it was cut off
+#define DARK 0.002   // light: below there is noise
+#define BRIGHT 0.98  // from here to 1 it was cut off
 #define STEPS 4096.0 // of a natural logarithm
 #define LEAST_GAIN 0.25
 #define MOST_GAIN 4.0
-#define SPREAD 0.3 // of the logarithms of two neighbors' ratio, before anything is measured, ...
+#define SPREAD 0.3       // of the logarithms of two neighbors' ratio, before anything is measured, ...
 #define SPREAD_PAIRS 8.0 // ... as if so many pairs said so
-#define SYSTEMATIC 0.03 // what two scans differ by, however many pairs they have: gloss, shadows
-#define TURN 1.5 // standard deviations from where on residuals count less [Huber 1964]
-#define LOOSE 1.0 // standard deviation of a gain's logarithm, before anything is measured: the regularization
+#define SYSTEMATIC 0.03  // what two scans differ by, however many pairs they have: gloss, shadows
+#define TURN 1.5         // standard deviations from where on residuals count less [Huber 1964]
+#define LOOSE 1.0        // standard deviation of a gain's logarithm, before anything is measured: the regularization
 
 struct pair {
     uint16_t scans[2]; // the lower first
@@ -156,8 +156,8 @@ static void measure(const struct pair *pairs, uint32_t count, int channel, doubl
     for (uint32_t i = 0; i < count; i++)
         room[i] = fabs(pairs[i].ways[channel] / STEPS - at);
     qsort(room, count, sizeof *room, pt_compare_doubles);
-    const double around = 1.4826 * room[count / 2], square = (around * around * count + SPREAD * SPREAD * SPREAD_PAIRS) /
-                                                             (count + SPREAD_PAIRS);
+    const double around = 1.4826 * room[count / 2],
+                 square = (around * around * count + SPREAD * SPREAD * SPREAD_PAIRS) / (count + SPREAD_PAIRS);
     const double turn = TURN * sqrt(fmax(around * around, 1e-4));
     for (int round = 0; round < ROUNDS; round++) {
         double sum = 0.0, weights = 0.0;
@@ -195,7 +195,7 @@ static uint32_t make_edges(const struct pair *pairs, uint32_t count, double *roo
 struct system { // of one channel: sum over edges of weight (x[a] - x[b] - mean)^2 + sum over scans of (x / LOOSE)^2
     const struct edge *edges;
     uint32_t edge_count, scans;
-    double *weights; // edges
+    double *weights;                                         // edges
     double *x, *right, *diagonal, *residual, *way, *product; // scans
 };
 
@@ -344,9 +344,7 @@ static int look_for_pairs(struct balance *balance, struct pt_pool *pool, uint32_
                 balance->pair_counts[i] * sizeof *balance->pairs);
         *count += balance->pair_counts[i];
     }
-    return error                                       ? error
-           : pt_progress_cancelled(balance->progress) ? PATINA_ERROR_CANCELLED
-                                                      : PATINA_OK;
+    return error ? error : pt_progress_cancelled(balance->progress) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
 
 static int find(struct balance *balance, struct pt_pool *pool, float *gains)

@@ -384,6 +384,11 @@ static void read_color(const patina_array *array, uint64_t index, float rgb[3])
     }
 }
 
+size_t pt_color_bytes(const struct patina_cloud *cloud)
+{
+    return cloud->slots * pt_color_size(cloud->color_format) + 4; // kernels read bytes as words
+}
+
 // Returns whether the colour is one.
 static int take_color(struct patina_cloud *cloud, const patina_array *color, uint32_t slot)
 {
@@ -396,11 +401,12 @@ static int take_color(struct patina_cloud *cloud, const patina_array *color, uin
     read_color(color, pt_number_of(cloud, slot), rgb);
     for (int k = 0; k < 3; k++)
         if (!isfinite(rgb[k])) {
-            rgb[k] = 0.0f;
             valid = 0;
         } else { // sums of lit neighbours must stay finite, and Blender's half floats too
             rgb[k] = fmaxf(fminf(rgb[k], MOST_COLOR), -MOST_COLOR);
         }
+    if (!valid) // as what has no color
+        memset(rgb, 0, 3 * sizeof *rgb);
     return valid;
 }
 
@@ -467,11 +473,6 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 }
 
 // ---- create --------------------------------------------------------------------------------------------------------
-
-static size_t color_bytes(const struct patina_cloud *cloud)
-{
-    return cloud->slots * pt_color_size(cloud->color_format) + 4; // kernels read bytes as words
-}
 
 static int add_chunk(struct build *build, uint32_t begin, uint32_t count)
 {
@@ -547,13 +548,13 @@ static int allocate(struct build *build)
     cloud->positions = pt_pages_alloc(cloud->slots * 12);
     cloud->order = pt_pages_alloc(cloud->slots * 4);
     cloud->surfels = pt_pages_alloc(cloud->slots * 4);
-    cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
+    cloud->colors = cloud->color_format ? pt_pages_alloc(pt_color_bytes(cloud)) : NULL;
     cloud->opacities = cloud->info.has_opacities ? pt_pages_alloc(opacity_bytes(cloud)) : NULL;
     cloud->radii = cloud->info.has_radii ? pt_pages_alloc(cloud->slots * 4) : NULL;
     if (!build->tallies || !cloud->positions || !cloud->order || !cloud->surfels || (cloud->color_format && !cloud->colors) ||
         (cloud->info.has_opacities && !cloud->opacities) || (cloud->info.has_radii && !cloud->radii))
         return PATINA_ERROR_MEMORY;
-    cloud->info.bytes = cloud->slots * (cloud->radii ? 24 : 20) + (cloud->colors ? color_bytes(cloud) : 0) +
+    cloud->info.bytes = cloud->slots * (cloud->radii ? 24 : 20) + (cloud->colors ? pt_color_bytes(cloud) : 0) +
                         (cloud->opacities ? opacity_bytes(cloud) : 0) + cloud->chunk_count * sizeof *cloud->chunks;
     return pt_cloud_values_begin(cloud, &build->desc);
 }
@@ -738,15 +739,15 @@ static uint64_t color_part(struct build *build, const struct patina_cloud *part)
 static int replace_colors(struct build *build)
 {
     struct patina_cloud *cloud = build->cloud;
-    size_t old_bytes = color_bytes(cloud);
+    size_t old_bytes = pt_color_bytes(cloud);
     enum pt_color_format old_format = cloud->color_format;
     void *old = cloud->colors;
     build->tallies = calloc(cloud->chunk_count + 1, sizeof *build->tallies);
     build->pool = pt_pool_create(cloud->threads, 0);
     cloud->color_format = color_format(&build->desc.color);
-    cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
+    cloud->colors = cloud->color_format ? pt_pages_alloc(pt_color_bytes(cloud)) : NULL;
     if (!build->tallies || !build->pool || (cloud->color_format && !cloud->colors)) {
-        pt_pages_free(cloud->colors, color_bytes(cloud));
+        pt_pages_free(cloud->colors, pt_color_bytes(cloud));
         cloud->color_format = old_format;
         cloud->colors = old;
         return PATINA_ERROR_MEMORY;
@@ -754,7 +755,7 @@ static int replace_colors(struct build *build)
     cloud->info.invalid_colors = 0;
     for (uint32_t i = 0; i < pt_part_count(cloud); i++)
         cloud->info.invalid_colors += color_part(build, pt_part(cloud, i));
-    cloud->info.bytes += (cloud->colors ? color_bytes(cloud) : 0) - (old ? old_bytes : 0);
+    cloud->info.bytes += (cloud->colors ? pt_color_bytes(cloud) : 0) - (old ? old_bytes : 0);
     cloud->info.has_colors = cloud->color_format != PT_COLOR_NONE;
     cloud->mapped &= ~(1u << PT_ARRAY_COLORS);
     pt_parts_follow(cloud);
@@ -763,7 +764,7 @@ static int replace_colors(struct build *build)
     return PATINA_OK;
 }
 
-int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color)
+int pt_cloud_set_colors(patina_cloud *cloud, const patina_array *color)
 {
     if (!cloud || !color)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_set_colors: bad arguments");

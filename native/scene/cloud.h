@@ -85,6 +85,7 @@ struct patina_cloud {
     uint32_t *order; // slots: index in the caller's arrays; NULL: see begins
     uint32_t *surfels;  // slots: octahedral normal and spacing class (shared/words.h)
     int beside;         // pt_shapes_beside; files keep it
+    int keeps_colors;   // points without a color stay black: patina_analysis_desc.keep_colors
     uint32_t *shapes;   // slots: footprint, thickness, kind (shared/words.h), or NULL where the cloud was not analysed
     void *colors;       // slots x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // slots, or NULL where every point is opaque
@@ -160,6 +161,10 @@ void pt_decode_normal(uint32_t word, double n[3]);
 
 // Local spacing by sampled nearest neighbours among the `count` points x, y, z.
 float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count);
+
+size_t pt_color_bytes(const struct patina_cloud *cloud); // of its array
+// Replaces the colours, as patina_cloud_set_colors does, but leaves points without one black.
+int pt_cloud_set_colors(patina_cloud *cloud, const patina_array *color);
 
 // Scalars and classes: cloud_values.c. Room for them once chunks stand; those of one, whose order stands, beside others; what all come to.
 int pt_check_values(patina_array *scalar, patina_array *classes);

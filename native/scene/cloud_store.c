@@ -20,11 +20,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Files of version 12 have no trust. Files of version 11 are also neither packed nor without order, and files of version 10 also have no
+// Files of version 13 have uncolored points that are black. Files of version 12 have no trust. Files of version 11 are also neither packed nor without order, and files of version 10 also have no
 // sums of pages.
 enum {
     SECTION = 1 << 16,
-    VERSION = 13,
+    VERSION = 14,
+    UNCOLORED = 13,
     UNTRUSTED = 12,
     UNPACKED = 11,
     WITHOUT_PAGES = 10,
@@ -49,8 +50,9 @@ struct header {
     double packed_error;
     uint32_t packed, unordered;
     uint64_t trusts[16]; // points of each level
+    uint64_t uncolored;  // points that their neighbors lent a color
 };
-_Static_assert(INFO_BYTES % 8 == 0 && sizeof(struct header) == offsetof(struct header, page_sum) + 24 + 128,
+_Static_assert(INFO_BYTES % 8 == 0 && sizeof(struct header) == offsetof(struct header, page_sum) + 24 + 136,
                "a header has no holes");
 
 static size_t tail_size(const struct header *header)
@@ -58,6 +60,7 @@ static size_t tail_size(const struct header *header)
     return header->version == WITHOUT_PAGES ? 0
            : header->version == UNPACKED    ? sizeof header->page_sum
            : header->version == UNTRUSTED   ? offsetof(struct header, trusts) - offsetof(struct header, page_sum)
+           : header->version == UNCOLORED   ? offsetof(struct header, uncolored) - offsetof(struct header, page_sum)
                                             : sizeof *header - offsetof(struct header, page_sum);
 }
 
@@ -214,6 +217,7 @@ static void fill_header(struct header *header, const struct patina_cloud *cloud)
     header->packed = cloud->packed != 0;
     header->unordered = cloud->unordered != 0;
     memcpy(header->trusts, cloud->info.trusts, sizeof header->trusts);
+    header->uncolored = cloud->info.uncolored;
     header->check = check_of(header, cloud->chunks);
 }
 
@@ -414,8 +418,8 @@ static int check_version(const char *path, const struct header *header, const pa
 {
     if (memcmp(header->magic, magic, sizeof magic))
         return refuse(path, "not a saved cloud");
-    if ((header->version != VERSION && header->version != UNTRUSTED && header->version != UNPACKED &&
-         header->version != WITHOUT_PAGES) ||
+    if ((header->version != VERSION && header->version != UNCOLORED && header->version != UNTRUSTED &&
+         header->version != UNPACKED && header->version != WITHOUT_PAGES) ||
         header->chunk_size != sizeof(struct pt_chunk) || info->struct_size != INFO_BYTES)
         return refuse(path, "a saved cloud of another version");
     return header->size == size ? PATINA_OK : refuse(path, "a saved cloud that was cut short");
@@ -469,8 +473,10 @@ static int read_header(const char *path, const struct pt_disk *disk, struct pati
     cloud->info.packed = header->packed;
     cloud->info.packed_error = header->packed_error;
     cloud->info.numbered = header->unordered;
-    if (header->version == VERSION)
+    if (header->version == VERSION) {
         memcpy(cloud->info.trusts, header->trusts, sizeof header->trusts);
+        cloud->info.uncolored = header->uncolored;
+    }
     cloud->packed = header->packed != 0;
     cloud->unordered = header->unordered != 0;
     cloud->slots = header->slots;
@@ -533,10 +539,10 @@ static void move_by(struct patina_cloud *cloud, const double offset[3])
     }
 }
 
-// An analysis of an older version has no trust. The caller analyzes the cloud again, as one that never was.
+// An analysis of an older version has no trust, or leaves points without a color black. The caller analyzes the cloud again, as one that never was.
 static void forget_analysis(const char *path, struct patina_cloud *cloud, const struct pt_section *shapes)
 {
-    pt_log(PT_LOG_WARNING, "%s: saved by an older version. The points are analyzed again, for their trust.", path);
+    pt_log(PT_LOG_WARNING, "%s: saved by an older version. The points are analyzed again, for their trust and colors.", path);
     pt_pages_free(cloud->shapes, shapes->size);
     cloud->shapes = NULL;
     cloud->mapped &= ~(1u << PT_ARRAY_SHAPES);

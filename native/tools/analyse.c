@@ -185,9 +185,11 @@ static int ends_in(const char *path, const char *ending)
     return length > size && !strcmp(path + length - size, ending);
 }
 
-static int analyse_cloud(const char *in, const char *out, uint32_t neighbours, uint64_t memory, patina_progress *progress)
+static int analyse_cloud(const char *in, const char *out, uint32_t neighbours, uint32_t keep_colors, uint64_t memory,
+                         patina_progress *progress)
 {
-    const patina_analysis_desc desc = {.struct_size = sizeof desc, .neighbours = neighbours, .keep_normals = 1};
+    const patina_analysis_desc desc = {
+        .struct_size = sizeof desc, .neighbours = neighbours, .keep_normals = 1, .keep_colors = keep_colors};
     patina_cloud *cloud = NULL;
     patina_cloud_info info = {.struct_size = sizeof info};
     int code = patina_cloud_analyse_file(in, &desc, memory, out, progress);
@@ -208,6 +210,7 @@ int tool_analyse(int count, char **arguments)
     double neighbours = 0;
     uint64_t memory = 0;
     int grid = 0;
+    uint32_t keep_colors = 0;
     struct columns columns = {0};
     for (int i = 0; i < count; i++) {
         const char *value = i + 1 < count ? arguments[i + 1] : NULL;
@@ -220,6 +223,8 @@ int tool_analyse(int count, char **arguments)
             i++;
         } else if (!strcmp(arguments[i], "--grid")) {
             grid = 1;
+        } else if (!strcmp(arguments[i], "--keep-colors")) {
+            keep_colors = 1;
         } else if (!strcmp(arguments[i], "--trusted")) {
             columns.trusted = 1;
         } else if (!strcmp(arguments[i], "--neighbours") && value) {
@@ -237,14 +242,14 @@ int tool_analyse(int count, char **arguments)
     if (!in || !out || !*out)
         return tool_misuse("analyse: a file to read, and -o OUT.ply, please");
     const int whole = ends_in(out, ".cloud");
-    if (whole != ends_in(in, ".cloud") || (whole && (grid || columns.trusted)) || (!whole && memory))
-        return tool_misuse(
-            "analyse: of IN.cloud -o OUT.cloud, with --memory and without --grid or --trusted; of any other file -o OUT.ply");
+    if (whole != ends_in(in, ".cloud") || (whole && (grid || columns.trusted)) || (!whole && (memory || keep_colors)))
+        return tool_misuse("analyse: of IN.cloud -o OUT.cloud, with --memory or --keep-colors and without --grid or --trusted; "
+                           "of any other file -o OUT.ply");
     patina_progress *progress = NULL;
     const int code = patina_progress_create(&progress);
     tool_cancellable(progress, NULL);
     const int result = code    ? tool_failed(in, NULL, code)
-                       : whole ? analyse_cloud(in, out, (uint32_t)neighbours, memory, progress)
+                       : whole ? analyse_cloud(in, out, (uint32_t)neighbours, keep_colors, memory, progress)
                                : analyse(in, out, (uint32_t)neighbours, grid, progress, &columns);
     tool_cancellable(NULL, NULL);
     tool_drain_log(1);

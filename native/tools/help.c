@@ -37,6 +37,7 @@ static const struct topic {
      "  --order keep|drop                  convert to .cloud: drop the order of the points, 4 bytes per point less (keep)\n"
      "  --trusted                          analyse: leave points of low trust out of the file\n"
      "  --neighbours K                     analyse: 3 to 64 neighbors (16, and 48 where 16 leave doubts)\n"
+     "  --keep-colors                      analyse: of IN.cloud; points without a color stay black\n"
      "  --grid                             analyse: use the rows and columns of scans, with their true borders\n",
      0},
     {"output", "size, passes and measurements",
@@ -91,6 +92,7 @@ static const struct topic {
      "  --ramp-colors NAME                 viridis, grey, heat, spectrum, relief, diverging or classes (viridis)\n"
      "  --attribute NAME                   the scalar that --effect contour_source=attribute follows (the ramp's)\n"
      "  --exposure STOPS, --contrast C     of the points' colors, before light\n"
+     "  --keep-colors                      points without a color stay black (they take their neighbors' color)\n"
      "  --no-balance                       scans keep their own exposure and white balance\n"
      "  --opacity X[,X...]                 0 to 1, of each FILE; the last counts for those behind it\n"
      "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"

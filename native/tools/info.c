@@ -101,6 +101,8 @@ static int info_of_saved(const char *path)
     printf("normals     %s\n", info.has_normals ? "yes" : "no");
     printf("colours     %s\n", info.has_colors ? "yes" : "no");
     printf("analysed    %s\n", info.has_shapes ? "yes" : "no");
+    if (info.uncolored)
+        printf("uncoloured  %llu points have the colour of their neighbours\n", (unsigned long long)info.uncolored);
     print_cloud(&info);
     patina_cloud_destroy(cloud);
     return TOOL_OK;

@@ -182,6 +182,8 @@ static int parse_switch(const char *name, struct tool_options *options)
         options->transparent = 1;
     else if (!strcmp(name, "--average"))
         options->settings.average = 1;
+    else if (!strcmp(name, "--keep-colors"))
+        options->color.keep_colors = 1;
     else if (!strcmp(name, "--no-balance"))
         options->color.unbalanced = 1;
     else if (!strcmp(name, "--shadows"))

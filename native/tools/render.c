@@ -98,6 +98,7 @@ static int analyse(struct job *job, patina_cloud *cloud, const char *path, const
 {
     patina_analysis_desc desc = {.struct_size = sizeof desc, .threads = job->options.threads, .keep_normals = 1};
     tool_describe_stations(stations, &desc);
+    desc.keep_colors = job->options.color.keep_colors;
     desc.free_space = job->options.color.free_space != PATINA_FREE_SPACE_OFF;
     patina_cloud_info info = {.struct_size = sizeof info};
     const int error = patina_cloud_get_info(cloud, &info);

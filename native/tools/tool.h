@@ -64,8 +64,9 @@ struct tool_color {
     float least_trust;
     patina_clip clips[TOOL_CLIPS];
     int clip_count;
-    float tint[4];  // and width; 0: none
-    int unbalanced; // scans keep the light that they were taken with
+    float tint[4];        // and width; 0: none
+    uint32_t keep_colors; // points without a color stay black
+    int unbalanced;       // scans keep the light that they were taken with
 };
 
 // Soft points.

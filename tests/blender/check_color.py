@@ -177,3 +177,38 @@ def test_after_import():
         render()
         check(any("'nowhere'" in text for _, text in reports), f"reports {reports}, link {link}")
         os.unlink(path)
+
+
+def test_uncolored_points_take_their_neighbors_color():
+    """Black specks among colored points are gone in the image and marked in Source; a black square stays; with other colors likewise."""
+    side = 90
+    scene = new_scene(64, 48)
+    scene.patina.smooth, scene.view_layers[0].patina.use_pass_source = 'OFF', True
+    v, u = (values.reshape(-1) for values in np.mgrid[:side, :side])
+    rng = np.random.default_rng(9)
+    places = np.stack([(u / side - 0.5) * 4, (v / side - 0.5) * 4, np.full(u.shape, -4.0)], 1) + rng.uniform(-0.01, 0.01, (side * side, 3))
+    colors = np.full((side * side, 4), (200, 160, 120, 255), np.uint8)
+    square = (abs(u - 45) < 8) & (abs(v - 45) < 8)
+    specks = (rng.random(side * side) < 0.06) & (abs(u - 45) + abs(v - 45) > 24)
+    colors[square | specks, :3] = 0
+    obj = add_points(places, colors)
+    obj.patina.lighting = 'UNLIT'
+    for attempt in range(2):
+        picture = render()
+        seen = picture["Source"][..., 0]
+        marked = seen == 0.5
+        share = marked.sum() / ((seen == 1) | marked).sum()
+        check(0.02 < share < 0.1, f"{share:.3f} are marked")
+        check_close(np.median(picture["Combined"][marked][:, :3], axis=0), linear((200, 160, 120))[:3] if attempt == 0 else linear((90, 90, 200))[:3], 0.02,
+                    "their color")
+        black = (picture["Combined"][..., :3].max(axis=2) < 0.02) & (picture["Combined"][..., 3] > 0.99)
+        rows, columns = np.nonzero(black)
+        check(len(rows) > 20 and abs(rows - 23.5).max() < 9 and abs(columns - 31.5).max() < 9, "the square alone is black")
+        other = np.where((square | specks)[:, None], (0, 0, 0, 255), (90, 90, 200, 255)) / 255.0
+        other[:, :3] = np.where(other[:, :3] <= 0.04045, other[:, :3] / 12.92, ((other[:, :3] + 0.055) / 1.055) ** 2.4)
+        name = next(a.name for a in obj.data.attributes if a.data_type in {'BYTE_COLOR', 'FLOAT_COLOR'})
+        obj.data.attributes[name].data.foreach_set("color", other.astype(np.float32).ravel())
+        obj.data.update_tag()
+    obj.patina.analysis = 'OFF'
+    picture = render()
+    check(not (picture["Source"][..., 0] == 0.5).any(), "nothing is marked without an analysis")

@@ -45,12 +45,12 @@ static struct scanned *strips(const double gains[SCANS][3], double apart, double
 static patina_cloud *cloud_of(const struct scanned *s, int floats, uint32_t threads)
 {
     patina_cloud *cloud = NULL;
-    const patina_cloud_desc desc = {.struct_size = sizeof desc,
-                                    .count = POINTS,
-                                    .threads = threads,
-                                    .position = {s->position, PATINA_FLOAT64, 3, 0},
-                                    .color = {floats ? (const void *)s->floats : s->bytes,
-                                              floats ? PATINA_FLOAT32 : PATINA_UINT8, 3, 0}};
+    const patina_cloud_desc desc = {
+        .struct_size = sizeof desc,
+        .count = POINTS,
+        .threads = threads,
+        .position = {s->position, PATINA_FLOAT64, 3, 0},
+        .color = {floats ? (const void *)s->floats : s->bytes, floats ? PATINA_FLOAT32 : PATINA_UINT8, 3, 0}};
     CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
     return cloud;
 }
@@ -79,8 +79,10 @@ static void test_known_gains(void **state)
         CHECK(patina_cloud_balance(wide, s->scan, SCANS, NULL, &again[0][0]), wide);
         assert_memory_equal(found, again, sizeof found);
         const double worst = spread(exposures, (const float(*)[3])found);
-        print_message("  %s: scans were up to %.2f apart, and are %.3f now\n", floats ? "floats" : "bytes",
-                      spread(exposures, (const float[SCANS][3]){{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}}), worst);
+        print_message(
+            "  %s: scans were up to %.2f apart, and are %.3f now\n", floats ? "floats" : "bytes",
+            spread(exposures, (const float[SCANS][3]){{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}}),
+            worst);
         assert_true(worst < 0.05);
         for (int k = 0; k < 3; k++) {
             double sum = 0;

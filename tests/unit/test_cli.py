@@ -9,30 +9,29 @@ import traceback
 from pathlib import Path
 
 sys.dont_write_bytecode = True
-sys.path.append(str(Path(__file__).resolve().parents[2] / "build"))
+sys.path[1:1] = [str(Path(__file__).resolve().parents[2] / folder) for folder in ("build", "tests")]
 import cli  # noqa: E402
 import cli_analysis  # noqa: E402
 import cli_borders  # noqa: E402
+import cli_colors  # noqa: E402
 import cli_files  # noqa: E402
 import cli_numbers  # noqa: E402
 import cli_pictures  # noqa: E402
 import cli_ranges  # noqa: E402
 import cli_trust  # noqa: E402
 import cli_usage  # noqa: E402
+from names import chosen  # noqa: E402
 
 
 def main():
     passed, failed = 0, 0
-    modules = (cli_analysis, cli_usage, cli_pictures, cli_borders, cli_numbers, cli_files, cli_ranges, cli_trust)
-    tests = [(name, test) for module in modules for name, test in vars(module).items() if name.startswith("test_")]
-    wanted = sys.argv[2:]
+    modules = (cli_analysis, cli_colors, cli_usage, cli_pictures, cli_borders, cli_numbers, cli_files, cli_ranges, cli_trust)
+    tests = {name: test for module in modules for name, test in vars(module).items() if name.startswith("test_")}
     with tempfile.TemporaryDirectory() as folder:
         cli.FOLDER = Path(folder)
-        for name, test in tests:
-            if wanted and name not in wanted:
-                continue
+        for name in chosen(tests, sys.argv[2:]):
             try:
-                test()
+                tests[name]()
                 passed += 1
             except Exception:  # a test's failure is one line of the sum, whatever it is
                 print(f"FAILED {name}")

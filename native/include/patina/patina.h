@@ -212,6 +212,7 @@ typedef struct patina_cloud_info {
     double packed_error;        // how far packing moved a position at most, object units
     uint64_t trusts[16];        // drawn points of each level of trust, where analysed: level l stands for 1 - ((15 - l) / 15)^2
     double trust_default;       // least trust of points that are drawn by default: PATINA_TRUST_DEFAULT
+    uint64_t uncolored; // drawn points without a color of their own, whose neighbors lent them one: patina_cloud_analyse
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -220,7 +221,8 @@ typedef struct patina_cloud_info {
 PATINA_API int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out);
 PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
 // Gives a cloud other colours (as in the descriptor, count elements; NULL data: none) and leaves all else as it is, so
-// that painting uploads colours alone. No frame may be rendering it meanwhile.
+// that painting uploads colours alone. No frame may be rendering it meanwhile. Of an analysed cloud points without a color get their
+// neighbors' again, as patina_cloud_analyse says.
 PATINA_API int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color);
 // The same for scalars.
 PATINA_API int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar);
@@ -277,6 +279,9 @@ typedef struct patina_analysis_desc {
     float *
         trust_features; // NULL, or PATINA_TRUST_FEATURES numbers of each point, `count` times, in the given order: what its trust
                         // is found from, to train with. Points that are not drawn read 0. For patina_cloud_analyse
+    uint32_t
+        keep_colors; // 1 = points without a color stay black. 0 = points that are exactly black, or were not finite, among colored
+                     // ones get the mean of their trusted colored neighbors (SPEC 11)
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
@@ -655,7 +660,7 @@ PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimu
     X(COMBINED, 4, "premultiplied scene-linear colour")                                                                        \
     X(DEPTH, 1, "linear z, +inf where nothing is")                                                                             \
     X(NORMAL, 3, "world-space unit normal, 0 where nothing is")                                                                \
-    X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")                   \
+    X(SOURCE, 1, "0 nothing; 1 measured; 0.5 measured without a color; 1 + d filled from d pixels away; negative: mixed")      \
     X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")                              \
     X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")                                   \
     X(TRUST, 1, "0..1, of the nearest point, as analysed; 0 where nothing is known, or nothing is")                            \
