@@ -320,7 +320,7 @@ class Cloud(_Handle):
                            keep_normals: bool = True, threads: int = 0, free_space: bool = False,
                            grid: tuple[np.ndarray, np.ndarray] | None = None, by_grid: bool = False,
                            scan: np.ndarray | None = None, directions: np.ndarray | None = None,
-                           trust_features: np.ndarray | None = None) -> tuple[abi.AnalysisDesc, tuple]:
+                           trust_features: np.ndarray | None = None, keep_colors: bool = False) -> tuple[abi.AnalysisDesc, tuple]:
         """The description, and what it needs to stay."""
         stations, directions = (None if places is None else np.ascontiguousarray(places, np.float64)
                                 for places in (stations, directions))
@@ -330,7 +330,7 @@ class Cloud(_Handle):
                              stations=stations.ctypes.data if count else None, station=_view(station, self.count),
                              free_space=free_space, row=_view(row, self.count), column=_view(column, self.count), grid=by_grid,
                              scan=_view(scan, self.count), direction_count=ways,
-                             directions=directions.ctypes.data if ways else None,
+                             directions=directions.ctypes.data if ways else None, keep_colors=keep_colors,
                              trust_features=None if trust_features is None else trust_features.ctypes.data), \
             (self, stations, station, grid, scan, directions, trust_features)
 
@@ -340,7 +340,7 @@ class Cloud(_Handle):
         free_space: marks points that another station saw through; grid: row and column of each point, (count, 1) uint16, uint32 or
         int32; by_grid: neighbours there tell surfaces and where these end; scan: in whose grid each lies, as station;
         directions: (n, 3), in which scans looked whose beams are parallel, else 0; trust_features: (count, 33) float32 zeros, which
-        what trust is found from goes into."""
+        what trust is found from goes into; keep_colors: points without a color stay black."""
         described, _kept = self._describe_analysis(**given)
         self._call("analyse", byref(described), _handle_of(progress))
         self._learn()

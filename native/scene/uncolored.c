@@ -59,9 +59,8 @@ static void light_of(const struct search *search, size_t slot, double light[3])
 {
     const struct pt_uncolored *job = search->job;
     for (size_t k = 0; k < 3; k++)
-        light[k] = job->cloud->color_format == PT_COLOR_SRGB8
-                       ? search->linear[((const uint8_t *)job->colors)[3 * slot + k]]
-                       : (double)((const float *)job->colors)[3 * slot + k];
+        light[k] = job->cloud->color_format == PT_COLOR_SRGB8 ? search->linear[((const uint8_t *)job->colors)[3 * slot + k]]
+                                                              : (double)((const float *)job->colors)[3 * slot + k];
 }
 
 static void set_color(const struct search *search, size_t slot, const double light[3])

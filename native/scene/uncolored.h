@@ -18,7 +18,7 @@ struct pt_uncolored {
     uint32_t least_level;             // of trust: points below are nobody's neighbors
     struct pt_store *store;           // for the arrays
     struct patina_progress *progress;
-    void *colors; // found: slots, in the cloud's format, to be freed from the store; NULL: all stay as they are
+    void *colors;   // found: slots, in the cloud's format, to be freed from the store; NULL: all stay as they are
     uint64_t count; // found: points that got a color
 };
 

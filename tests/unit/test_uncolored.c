@@ -47,12 +47,12 @@ static struct wall *wall_of(double share, uint32_t seed)
 static patina_cloud *cloud_of(const struct wall *w, int floats, uint32_t threads)
 {
     patina_cloud *cloud = NULL;
-    const patina_cloud_desc desc = {.struct_size = sizeof desc,
-                                    .count = POINTS,
-                                    .threads = threads,
-                                    .position = {w->position, PATINA_FLOAT64, 3, 0},
-                                    .color = {floats ? (const void *)w->light : w->color,
-                                              floats ? PATINA_FLOAT32 : PATINA_UINT8, 3, 0}};
+    const patina_cloud_desc desc = {
+        .struct_size = sizeof desc,
+        .count = POINTS,
+        .threads = threads,
+        .position = {w->position, PATINA_FLOAT64, 3, 0},
+        .color = {floats ? (const void *)w->light : w->color, floats ? PATINA_FLOAT32 : PATINA_UINT8, 3, 0}};
     CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
     return cloud;
 }
@@ -137,7 +137,8 @@ static void test_reference(void **state)
             assert_int_equal(marks[i], round_of[i] > 0 && round_of[i] < 255);
             untrusted += (double)trust[i] < info.trust_default - 1e-6;
             for (int k = 0; k < 3; k++)
-                worst = fmax(worst, fabs((floats ? got[3 * i + k] : pt_linear_of_srgb(got[3 * i + k] / 255)) - light[3 * i + k]));
+                worst = fmax(worst,
+                             fabs((floats ? got[3 * i + k] : pt_linear_of_srgb(got[3 * i + k] / 255)) - light[3 * i + k]));
         }
         print_message("  %s: %llu of 12 %% black points got a color, %llu points are untrusted; off by %g\n",
                       floats ? "floats" : "bytes", (unsigned long long)filled, (unsigned long long)untrusted, worst);
