@@ -190,12 +190,6 @@ class FrameStats(Descriptor):
                 ("points_lost", c_uint64), ("untrusted", c_uint64), ("none_trusted", c_uint64)]
 
 
-class Panorama(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
-                ("world_from_camera", c_double * 16), ("longitude", c_double * 2), ("latitude", c_double * 2),
-                ("near_clip", c_double), ("far_clip", c_double)]
-
-
 class BuilderDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("memory", c_uint64), ("count", c_uint64), ("box_min", c_double * 3),
                 ("box_max", c_double * 3), ("threads", c_uint32), ("narrow_colors", c_uint32)]
@@ -266,6 +260,12 @@ class PagesDesc(Descriptor):
 class PagesInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("points", c_uint64), ("arrived", c_uint64), ("pages", c_uint32),
                 ("pages_arrived", c_uint32), ("wanted", c_uint64), ("pages_wanted", c_uint32), ("returned", c_uint32)]
+
+
+class Panorama(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
+                ("world_from_camera", c_double * 16), ("longitude", c_double * 2), ("latitude", c_double * 2),
+                ("near_clip", c_double), ("far_clip", c_double)]
 
 
 class Part(Descriptor):
@@ -363,9 +363,6 @@ CALLS = {
     "patina_frame_keep_planes": (c_void_p, c_uint32),
     "patina_frame_measure": (c_void_p, c_uint32),
     "patina_frame_dump_planes": (c_void_p, c_char_p),
-    "patina_panorama_camera": (POINTER(Panorama), c_uint32, POINTER(Camera), c_void_p),
-    "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
-    "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
     "patina_builder_begin": (c_char_p, POINTER(BuilderDesc), POINTER(c_void_p)),
     "patina_builder_add": (c_void_p, POINTER(CloudDesc)),
     "patina_builder_add_file": (c_void_p, c_void_p, c_char_p),
@@ -404,6 +401,9 @@ CALLS = {
     "patina_cloud_wanted": (c_void_p, c_double, c_void_p, c_uint32, c_void_p),
     "patina_cloud_get_pages": (c_void_p, POINTER(PagesInfo)),
     "patina_task_give_page": (c_void_p, c_uint32, POINTER(CloudDesc), POINTER(c_void_p)),
+    "patina_panorama_camera": (POINTER(Panorama), c_uint32, POINTER(Camera), c_void_p),
+    "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
+    "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
     "patina_frame_scatter": (c_void_p, c_void_p, POINTER(Part), c_char_p),
     "patina_frame_merge": (c_void_p, c_void_p, POINTER(c_void_p), c_uint32, c_char_p, c_void_p),
     "patina_keys_get_info": (c_char_p, POINTER(KeysInfo)),

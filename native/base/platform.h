@@ -149,6 +149,9 @@ struct pt_whole {
     intptr_t lock; // of the system's own
 };
 int pt_whole_begin(const char *path, struct pt_whole *whole); // an error: there is nothing to end
+// Endings of further files that whoever writes one may put beside `beside` meanwhile. He deletes them; if he is killed, the next begin does.
+enum { PT_WHOLE_STEPS = 3 };
+static const char *const pt_whole_steps[PT_WHOLE_STEPS] = {".built", ".analysed", ".smaller"};
 // good: all was written, so the file takes its place. By the thread that wrote. Returns the error that kept it from doing so.
 int pt_whole_end(struct pt_whole *whole, int good);
 // Puts a file in another's place, which is one or the other at any time. Returns an error as above.

@@ -478,18 +478,34 @@ static int take_slot(const struct pt_whole *whole, int flags, int *descriptor)
     }
 }
 
-// What others left beside and nobody writes any more.
+// Deletes the files that pt_whole_steps names for the slot in whole->beside.
+static void remove_steps(const struct pt_whole *whole)
+{
+    static const char *const endings[] = {"", ".part"};
+    const size_t length = strlen(whole->beside), room = length + 32;
+    char *name = malloc(room);
+    for (int i = 0; name && i < PT_WHOLE_STEPS; i++)
+        for (int k = 0; k < 2; k++) {
+            snprintf(name, room, "%s%s%s", whole->beside, pt_whole_steps[i], endings[k]);
+            unlink(name);
+        }
+    free(name);
+}
+
+// Deletes what processes left beside the file that no longer write it.
 static void remove_left(const struct pt_whole *whole, int own)
 {
     int descriptor;
     for (int slot = 0; slot < SLOTS; slot++) {
         name_slot(whole, slot);
         if (slot != own && !take_slot(whole, 0, &descriptor)) {
+            remove_steps(whole);
             unlink(whole->beside);
             close(descriptor);
         }
     }
     name_slot(whole, own);
+    remove_steps(whole);
 }
 
 int pt_whole_begin(const char *path, struct pt_whole *whole)

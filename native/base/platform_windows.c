@@ -460,7 +460,7 @@ static void remove_left(const wchar_t *wide)
     if (!all)
         return;
     memcpy(all, wide, length * sizeof *all);
-    memcpy(all + length, L".*.part", 8 * sizeof *all);
+    memcpy(all + length, L".*.part*", 9 * sizeof *all); // of pt_whole_steps too
     const HANDLE search = FindFirstFileW(all, &found);
     if (search != INVALID_HANDLE_VALUE) {
         do {

@@ -62,8 +62,9 @@ struct job {
     patina_builder *builder;
     struct tool_stations stations;
     int has_stations;
-    const char *place; // the built cloud: beside the file, where something follows
-    const char *found; // the analysed one: the file, or beside it, where it is made smaller
+    struct pt_whole own; // holds the names beside the file for this process
+    const char *place;   // the built cloud: beside the file, where something follows
+    const char *found;   // the analysed one: the file, or beside it, where it is made smaller
     uint64_t memory;
 };
 
@@ -199,8 +200,12 @@ static int analyse(struct job *job)
 
 static int is_smaller(const struct tool_build *build) { return build->pack || build->drop_order; }
 
-static char *beside(const char *path, const char *ending)
+enum step { BUILT, ANALYSED, SMALLER }; // of pt_whole_steps
+
+// The name beside the file of what a step makes.
+static char *beside(const struct job *job, enum step step)
 {
+    const char *path = job->own.beside, *ending = pt_whole_steps[step];
     char *name = malloc(strlen(path) + strlen(ending) + 1);
     if (name)
         strcat(strcpy(name, path), ending);
@@ -240,7 +245,7 @@ static int save_as(const struct job *job, const char *from)
 {
     const char *out = job->build->out;
     const int itself = !strcmp(from, out);
-    char *own = itself ? beside(out, ".smaller") : NULL, text[128];
+    char *own = itself ? beside(job, SMALLER) : NULL, text[128];
     patina_cloud_info info;
     if (itself && !own)
         return TOOL_FAILED;
@@ -287,8 +292,7 @@ static int convert(struct job *job)
         return tool_misuse("--attribute: a saved cloud has the one that it was made with");
     const int builds_beside = !built && (!build->unanalysed || is_smaller(build));
     const int finds_beside = !build->unanalysed && is_smaller(build);
-    char *own = builds_beside ? beside(build->out, ".built") : NULL,
-         *found = finds_beside ? beside(build->out, ".analysed") : NULL;
+    char *own = builds_beside ? beside(job, BUILT) : NULL, *found = finds_beside ? beside(job, ANALYSED) : NULL;
     int result = (builds_beside && !own) || (finds_beside && !found) ? TOOL_FAILED : TOOL_OK;
     job->place = built ? build->in : own ? own : build->out;
     job->found = found ? found : build->out;
@@ -314,7 +318,13 @@ int tool_convert_to_cloud(const struct tool_build *build)
     }
     job.report = (struct report){.path = build->in, .progress = job.progress};
     tool_cancellable(job.progress, NULL);
-    const int result = convert(&job);
+    char text[128];
+    const int error = pt_whole_begin(build->out, &job.own);
+    if (error)
+        tool_say("%s: cannot be written: %s", build->out, pt_error_text(error, text, sizeof text));
+    const int result = error ? TOOL_FAILED : convert(&job);
+    if (!error)
+        pt_whole_end(&job.own, 0); // what was made has its name already
     tool_cancellable(NULL, NULL);
     tool_drain_log(1);
     patina_builder_destroy(job.builder);

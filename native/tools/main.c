@@ -14,7 +14,8 @@
 static void clean(char *text)
 {
     for (unsigned char *at = (unsigned char *)text; *at; at++) {
-        const int control = *at < 0x20 || *at == 0x7F, upper = at[0] == 0xC2 && at[1] >= 0x80 && at[1] < 0xA0;
+        const int control = *at < 0x20 || *at == 0x7F,
+                  upper = (at[0] == 0xC2 && at[1] >= 0x80 && at[1] < 0xA0) || (at[0] == 0xD8 && at[1] == 0x9C);
         const int mark = at[0] == 0xE2 &&
                          ((at[1] == 0x80 && ((at[2] >= 0xAA && at[2] <= 0xAE) || at[2] == 0x8E || at[2] == 0x8F)) ||
                           (at[1] == 0x81 && at[2] >= 0xA6 && at[2] <= 0xA9));

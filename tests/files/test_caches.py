@@ -98,6 +98,18 @@ def test_killed_at_any_moment():
     print("\n".join(table))
 
 
+def test_steps_of_killed_conversions_go():
+    """A conversion that was killed between its steps leaves the whole cloud of a step; the next one of any kind removes it."""
+    scan()
+    for step in (".built", ".analysed", ".smaller", ".built.part"):
+        for slot in ("", "4"):
+            beside = SCRATCH / f"steps.cloud.part{slot}"
+            beside.write_bytes(b"")
+            beside.with_name(beside.name + step).write_bytes(b"half")
+    run("convert", "scan.ply", "steps.cloud", "--analysis", "off")
+    assert not left_beside("steps.cloud"), left_beside("steps.cloud")
+
+
 def test_conversions_at_once():
     """Of two scans to one name: each ends well, and the file is one of theirs."""
     scan(), scan("other.ply", 6000)

@@ -27,7 +27,7 @@ SCRATCH = Path(tempfile.mkdtemp(prefix="patina-names-"))
 PATINA = str(Path(os.environ["PATINA_LIBRARY"]).parent / "patina")
 PLY = "ply\nformat ascii 1.0\nelement vertex 30\nproperty float x\nproperty float y\nproperty float z\nend_header\n" + \
     "".join(f"{i % 5} {i // 5} 0\n" for i in range(30))
-NAMES = ("\u05e2\u05e0\u05df", "\u0633\u062d\u0627\u0628", "\u202egnp", "a\u2066b\u2069", "\u200f", "a\nb", "\x1b[31mred\x1b]0;x\x07", "\x9b2J", "tab\tand\rback\b",
+NAMES = ("\u05e2\u05e0\u05df", "\u0633\u062d\u0627\u0628", "\u202egnp", "a\u2066b\u2069", "\u200f", "\u061c", "a\nb", "\x1b[31mred\x1b]0;x\x07", "\x9b2J", "tab\tand\rback\b",
          " ", "  .", "'\"$`&|;*?", "%s%n%08x", "-o", "--help", "#", "~", "\\", "n" * 225, "\u00e9", "e\u0301", "\U0001F5FF", "\ud83d\udc4d", os.fsdecode(b"\xff\xfe\xc3"),
          "CON", "nul", "file:", "http:x", "a?b=c", "{}", "$(id)")
 

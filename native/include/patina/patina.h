@@ -25,8 +25,8 @@
 //   black, and none. PATINA_*_INIT begins such a descriptor: exact, with every default spelled out.
 //   Programs and libraries may be of different age. A descriptor that is shorter than the library's is taken as if the rest were
 //   zero; of a longer one what the library does not know must be zero, else PATINA_ERROR_UNSUPPORTED. Structures that are handed
-//   out are filled as far as they reach; what the library does not know becomes 0. struct_size at or below sizeof(size_t) is
-//   PATINA_ERROR_ARGUMENT. New fields stand at the end, and never in what was padding; fields neither move nor go.
+//   out are filled as far as they reach; what the library does not know becomes 0. struct_size must be a multiple of 8 from 16 to 65536,
+//   else PATINA_ERROR_ARGUMENT. New fields stand at the end, and never in what was padding; fields neither move nor go.
 //   Pictures are row-major float32, row 0 at the BOTTOM (as Blender's and OpenGL's), colour scene-linear and
 //   premultiplied. Matrices are float64, row-major, column vectors: world = M * object.
 //   View space is right-handed and looks down -z. "z" in passes is linear distance: to the camera plane in
@@ -750,7 +750,8 @@ PATINA_API int patina_frame_read_layer(const patina_frame *frame, uint32_t layer
 PATINA_API int patina_nearest_depths(const float *depths, uint32_t width, uint32_t height, float *nearest, size_t size);
 // The visibility keys of the first layer, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone
 // after a render that failed or was cancelled, and with a cloud that they show (PATINA_ERROR_EMPTY). Scenes of more than 2^32 - 2 points
-// and triangles have numbers that keys do not hold (PATINA_ERROR_TOO_MANY_POINTS): patina_frame_read_numbers.
+// and triangles have numbers that keys do not hold (PATINA_ERROR_TOO_MANY_POINTS): patina_frame_read_numbers. PATINA_ERROR_FILE: a mapped
+// cloud's file, which has the numbers, was cut short or cannot be read.
 PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
 // ---- shadow textures: kept by the frame while points, casters, lights' places and sizes, samples and resolution stay; lights'
 // power and colour, and lights and clouds that move together, change nothing. `light` counts the lights that cast.
@@ -793,38 +794,6 @@ PATINA_API int patina_frame_measure(patina_frame *frame, uint32_t measure);
 // Writes every plane of the last render, but bins of discs and those that others took the place of, as raw little-endian files with a .txt line of their shape into a folder.
 PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *folder);
 
-// ---- panoramas: equirectangular pictures around an eye, as Blender's -------------------------------------------------------
-
-// Columns are longitudes, rows latitudes. The picture is joined from six perspective views, which the caller renders with any
-// scene and settings:
-//
-//     for (face = 0; face < 6; face++) {
-//         patina_panorama_camera(&panorama, face, &camera, &size); // settings.width = settings.height = size
-//         ... render, and read the passes into faces[face] ...
-//     }
-//     patina_panorama_join(&panorama, PATINA_PASS_COMBINED, faces, pixels, size_in_bytes);
-typedef struct patina_panorama {
-    size_t struct_size;
-    uint32_t width, height;       // of the whole picture, 1..65536
-    uint32_t region[4];           // x0, y0, x1, y1 in pixels (from bottom left): join only this crop; all zero = whole
-    double world_from_camera[16]; // -z is the middle of the whole picture, +y its upper border
-    double longitude[2]; // radians at the left and the right border, within -pi..pi, growing to the right; zero = -pi, pi
-    double latitude[2];  // at the lower and the upper border, within -pi/2..pi/2; both zero = -pi/2, pi/2
-    double near_clip, far_clip; // distances from the eye; in the middle of a face the near one is 1.8 times nearer
-} patina_panorama;
-
-// The camera of a face, 0..5, and the pixels of its side: as fine as the picture in the middle of a face, finer elsewhere.
-// Faces overlap by a guard band. Any thread.
-PATINA_API int patina_panorama_camera(const patina_panorama *panorama, uint32_t face, patina_camera *camera, uint32_t *size);
-// Joins a pass of the six faces (size * size * channels float32 each) into the caller's picture; size in bytes must fit the
-// region exactly. COMBINED is the mean of four points a pixel, and goes over from face to face within the guard bands; other
-// passes take the nearest pixel of one face. DEPTH becomes the distance from the eye. Blocks; threads of its own; any thread.
-PATINA_API int patina_panorama_join(const patina_panorama *panorama, uint32_t pass, const float *const faces[6], float *pixels,
-                                    size_t size);
-// The same for keys (patina_frame_read_keys); their z stays that of the face.
-PATINA_API int patina_panorama_join_keys(const patina_panorama *panorama, const uint64_t *const faces[6], uint64_t *keys,
-                                         size_t size);
-
 #ifdef __cplusplus
 }
 #endif
@@ -834,6 +803,7 @@ PATINA_API int patina_panorama_join_keys(const patina_panorama *panorama, const 
 #include "files.h"
 #include "meshes.h"
 #include "pages.h"
+#include "panorama.h"
 #include "parts.h"
 #include "points.h"
 #include "tasks.h"
