@@ -42,8 +42,7 @@ int pt_sieve_keep(struct pt_late_sieve **list, const struct pt_plan *plan, const
     }
     memcpy(buffers, bound, pass->ref_count * sizeof *buffers);
     memcpy(copy, context, context_size);
-    *sieve = (struct pt_late_sieve){
-        .next = *list, .plan = plan, .pass = pass, .run = run, .context = copy, .bound = buffers};
+    *sieve = (struct pt_late_sieve){.next = *list, .plan = plan, .pass = pass, .run = run, .context = copy, .bound = buffers};
     *list = sieve;
     return PATINA_OK;
 }
