@@ -40,10 +40,11 @@ static inline vi vi_shr(vi a, int n) { return a >> n; }
 static inline vm vi_eq(vi a, vi b) { return a == b; }
 static inline vm vi_lt_unsigned(vi a, vi b) { return a < b; }
 static inline vi vi_gather(const void *base, vi i, vm m) { return m ? vi_load((const char *)base + (size_t)i * 4) : 0; }
-// Another thread may lower the key meanwhile.
+// Reads four bytes, since vi_gather_id begins four bytes before the keys. Another thread may lower the key meanwhile.
 static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m)
 {
-    return m ? (uint32_t)(__atomic_load_n(keys + i, __ATOMIC_RELAXED) >> 32) : 0;
+    typedef uint32_t __attribute__((may_alias)) half;
+    return m ? __atomic_load_n((const half *)(const void *)((const char *)keys + 8 * (size_t)i + 4), __ATOMIC_RELAXED) : 0;
 }
 static inline vi vi_load_z(const uint64_t *keys) { return (uint32_t)(*keys >> 32); }
 static inline vi vi_load_id(const uint64_t *keys) { return (uint32_t)*keys; }
