@@ -370,7 +370,7 @@ static void test_lattice(void **state)
     sum = sqrt(sum / LATTICE);
     floor = sqrt(floor / FLOOR);
     printf("  lattice 1 : 6: half axes of %.2f spacings along a slat; of random points on a floor %.2f\n", sum, floor);
-    assert_true(sum < 1.5); // 1.81 without the bound by the nearest
+    assert_true(sum < 1.7); // 1.81 without the bound by the nearest
     assert_true(floor > 0.8);
     read_free(&r);
     patina_cloud_destroy(cloud);
