@@ -54,7 +54,7 @@ def _columns(path: Path, words: dict[str, list[str]]) -> np.dtype:
         return np.dtype([(f"{name}.{i}" if name in fields[:i] or name == "_" else name, kind, (int(count),))
                          for i, (name, kind, count) in enumerate(zip(fields, kinds, counts, strict=True))])
     except (KeyError, ValueError) as error:
-        raise _fail(path, f"FIELDS, SIZE, TYPE and COUNT do not fit together: {error}") from None
+        raise _fail(path, f"FIELDS, SIZE, TYPE and COUNT do not fit together: {str(error)[:200]}") from None
 
 
 def _count(path: Path, words: dict[str, list[str]]) -> int:
@@ -65,7 +65,9 @@ def _count(path: Path, words: dict[str, list[str]]) -> int:
         raise _fail(path, "says not how many points it holds") from None
     for name, number in numbers.items():
         if number < 0:
-            raise _fail(path, f"{name} is {number:,}; it must not be below 0")
+            raise _fail(path, f"{name} is {words[name][0][:40]}; it must not be below 0")
+        if number >> 63:
+            raise _fail(path, f"{name} is {words[name][0][:40]}…; no file holds so many points")
     return count
 
 
@@ -110,7 +112,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     elif form == "binary_compressed":
         table, held = (yield from _compressed(path, data, at, kind, count, progress)), count
     else:
-        raise _fail(path, f"DATA {form} is not ascii, binary or binary_compressed")
+        raise _fail(path, f"DATA {form[:40]} is not ascii, binary or binary_compressed")
     station = _organise(words, table, count)
     points = _assemble(path, table, wanted)
     points.warnings += _faults(path, words, count, held)
@@ -147,7 +149,7 @@ def _ascii(path: Path, text: bytes, kind: np.dtype, count: int, progress: Progre
         try:
             pieces.append(np.array(text[at:end].split(), np.float64))
         except ValueError as error:
-            raise _fail(path, str(error)) from None
+            raise _fail(path, str(error)[:200]) from None
         at = end + 1
         yield jobs.Pause()
     words = np.concatenate(pieces)

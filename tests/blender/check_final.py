@@ -201,7 +201,7 @@ def test_options():
     check(read(["--", "--patina-noise", "0.02"]) == {"noise": 0.02}, "noise")
     for words, part in ((["--patina-noise", "much"], "a number from 0 to 1"), (["--patina-device", "abacus"], "auto, cpu"), (["--patina-colour"], "only device"),
                         (["--patina-threads", "many"], "a number"),
-                        (["--patina-strict=no"], "no value")):
+                        (["--patina-strict=no"], "does not take a value")):
         try:
             read(["--", *words])
         except native.PatinaError as error:

@@ -102,9 +102,9 @@ def test_real_readers_from_files():
     with zipfile.ZipFile(path, "w") as archive:
         for item in holds:
             archive.write(item, item.relative_to(source))
-    code = (f"import sys; sys.path.insert(0, {str(SCRATCH / 'packages')!r}); from pathlib import Path\n"
-            "import importlib.util as u; s = u.spec_from_file_location('readers', "
-            f"{str(REPOSITORY / 'addon/readers.py')!r}); m = u.module_from_spec(s); s.loader.exec_module(m)\n"
+    code = ("import sys, types; from pathlib import Path\n"
+            f"alone = types.ModuleType('alone'); alone.__path__ = [{str(REPOSITORY / 'addon')!r}]; sys.modules['alone'] = alone\n"
+            "import alone.readers as m\n"
             f"assert 'laspy' in m.missing(); list(m.install([Path({str(path)!r})], Path({str(FOLDER)!r})))\n"
             "import laspy, lazrs; assert laspy.LazBackend.Lazrs.is_available(); print('READY', laspy.__file__)")
     import numpy

@@ -19,7 +19,7 @@ from check_import import import_ply
 from check_kept import forget
 from check_linked import dense
 from check_preferences import enabled
-from harness import SCRATCH, Skip, check, new_scene, render
+from harness import SCRATCH, Skip, check, forget_files, new_scene, render
 from patina import importers, styles
 from patina.sync import edits, files, linked
 
@@ -115,6 +115,7 @@ def test_packed_file_is_half_written():
     """A packed file that was put down by halves, or damaged since, is put down anew."""
     base, scan = places("half")
     new_scene()
+    forget_files()
     obj, = import_ply(scan, link=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(base / "half.blend"))
     bpy.ops.file.pack_all()

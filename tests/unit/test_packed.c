@@ -27,7 +27,7 @@ enum {
     ERROR_AT = 520,
     PACKED_AT = 528,
     UNORDERED_AT = 532,
-    TAIL = 24 + 128 // bytes of the header behind its sum: of pages, packing and order, and levels of trust
+    TAIL = 24 + 128 + 8 // bytes of the header behind its sum: of pages, packing and order, levels of trust, uncolored points
 };
 
 #ifdef _WIN32
@@ -412,8 +412,9 @@ static void test_lying_heads(void **state)
                 {UNORDERED_AT, 1, "its header is damaged"},
                 {UNORDERED_AT, 7, "its header is damaged"},
                 {ERROR_AT + 4, 0x7FF80000u, "its header is damaged"},
-                {VERSION_AT, 14, "another version"},
+                {VERSION_AT, 15, "another version"},
                 {VERSION_AT, 9, "another version"},
+                {VERSION_AT, 13, "its header or chunks are damaged"},
                 {VERSION_AT, 12, "its header or chunks are damaged"},
                 {VERSION_AT, 11, "its header is damaged"}};
     size_t size;
