@@ -108,8 +108,8 @@ static vm mix_edges(const struct tail *tail, const struct around *around, const 
         far = vm_and(far, vi_lt_unsigned(vi_add(vi_set(qx), vi_lanes()), vi_set(view->width)));
         if (tail->through) { // where no pixel shows, peeling leaves what comes through as it is
             vi at = vi_add(vi_set((y + (uint32_t)pt_cross[d][1]) * view->width + qx), vi_lanes());
-            vm hidden = vf_lt(vf_gather(tail->through, at, far), vf_set(PT_SPENT));
-            far = vm_and(far, vm_not(vm_and(hidden, vf_le(empty, z))));
+            vm open = vm_and(far, vf_le(empty, z)); // of other pixels another thread writes it now
+            far = vm_and(far, vm_not(vm_and(open, vf_lt(vf_gather(tail->through, at, open), vf_set(PT_SPENT)))));
         }
         count = vf_add_where(far, count, one);
         far = vm_and(far, vf_lt(z, empty));

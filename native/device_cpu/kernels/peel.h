@@ -48,7 +48,7 @@ static inline vm pt_peel_pixels(const struct peel_args *args, const struct pt_pe
     if (args->stop)
         next = vf_select(vf_lt(light, vf_set(PT_SPENT)), finished, next);
     vf beyond = vf_select(behind, next, vf_select(some, before, finished));
-    vf_store_where(planes->through + at, light, lanes);
+    vf_store_where(planes->through + at, light, first ? lanes : behind); // others keep theirs, which neighbors' edges read
     vf_store_where(planes->limit + at, beyond, lanes);
     // 4. of the tile
     tile->covered += (uint32_t)__builtin_popcount(vm_bits(behind));
