@@ -64,7 +64,7 @@ def read_job() -> dict:
 def _is_text(value: object) -> bool:
     """One line without control characters: it becomes a part of scripts, logs and paths."""
     return isinstance(value, str) and len(value) <= MOST_LETTERS and not any(
-        ord(letter) < 32 or 127 <= ord(letter) < 160 or letter in "\u2028\u2029" for letter in value)
+        ord(letter) < 32 or 127 <= ord(letter) < 160 or 0xD800 <= ord(letter) < 0xE000 or letter in "\u2028\u2029" for letter in value)
 
 
 def _are(kind: object, values: object, count: int = -1) -> bool:

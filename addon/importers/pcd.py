@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import jobs, native
-from .reading import Filter, PointFile, Progress, grid_normals, origin_of, regular, scanners_of
+from .reading import Filter, PointFile, Progress, grid_normals, origin_of, regular, scanners_of, told
 
 _KINDS = {("F", 4): "<f4", ("F", 8): "<f8", ("U", 1): "u1", ("U", 2): "<u2", ("U", 4): "<u4", ("U", 8): "<u8",
           ("I", 1): "i1", ("I", 2): "<i2", ("I", 4): "<i4", ("I", 8): "<i8"}
@@ -21,7 +21,7 @@ COPIES = 1 << 16  # of a compressed file, the same
 
 
 def _fail(path: Path, what: str) -> native.PatinaError:
-    return native.PatinaError(f"{path.name}: {what}", -4)
+    return native.PatinaError(f"{path.name}: {told(what)[:500]}", -4)  # what the file says is no more than text
 
 
 def _header(path: Path, head: bytes) -> tuple[dict[str, list[str]], int]:
@@ -112,7 +112,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     elif form == "binary_compressed":
         table, held = (yield from _compressed(path, data, at, kind, count, progress)), count
     else:
-        raise _fail(path, f"DATA {form[:40]} is not ascii, binary or binary_compressed")
+        raise _fail(path, f"DATA {form} is not ascii, binary or binary_compressed")
     station = _organise(words, table, count)
     points = _assemble(path, table, wanted)
     points.warnings += _faults(path, words, count, held)

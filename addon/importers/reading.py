@@ -183,13 +183,14 @@ def regular(path: Path) -> Path:
     return path
 
 
-_CONTROLS = {code: "\N{REPLACEMENT CHARACTER}" for code in (*range(9), *range(11, 32), *range(127, 160))}
+_CONTROLS = {code: "\N{REPLACEMENT CHARACTER}" for code in (*range(9), *range(11, 32), *range(127, 160), *range(0xD800, 0xDC80), *range(0xDD00, 0xE000))}
 
 
 def told(text: object) -> str:
     """As Blender's texts and names take it: bytes of a file's name that are no UTF-8, and control characters, which a terminal obeys, become
     replacement characters."""
-    return str(text).encode("utf-8", "surrogateescape").decode("utf-8", "replace").translate(_CONTROLS)
+    plain = str(text).translate(_CONTROLS)
+    return plain.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def name_of(path: Path) -> str:

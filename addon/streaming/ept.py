@@ -87,7 +87,7 @@ def read_tree(source: Source) -> Tree:
         record = np.dtype([(name, kind) for name, (kind, *_) in fields.items()])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise SourceError(f"{name} is damaged: bounds, span, schema or types are none of EPT's") from None
-    if packed not in ENDINGS:
+    if not isinstance(packed, str) or packed not in ENDINGS:
         raise SourceError(f"its points are packed as '{str(packed)[:40]}', which is not read: laszip and binary are")
     if packed == "binary" and any(fields[axis][0].startswith("V") for axis in "XYZ"):
         raise SourceError(f"{name} is damaged: X, Y or Z is no number that EPT has")

@@ -29,7 +29,10 @@ PIECE = 1 << 16
 
 
 class SourceError(Exception):
-    """The text is for the artist; who catches it says where."""
+    """The text is for the artist; who catches it says where. What a file or a server says in it is no more than text: without control characters."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__("".join(letter if letter.isprintable() or letter in " \u00a0" else "?" for letter in text[:1000]))
 
 
 class Unreachable(SourceError):

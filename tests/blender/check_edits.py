@@ -279,7 +279,7 @@ def test_scans_of_old_and_damaged_caches():
     other, = import_ply(dense("one.ply", 500), link=True)
     bpy.context.view_layer.objects.active = other
     for operator, words in ((bpy.ops.object.patina_scans_color, "one scan only"),
-                            (lambda: bpy.ops.object.patina_points_select_by(by='SCAN', number=0), "does not store the scan")):
+                            (lambda: bpy.ops.object.patina_points_select_by(by='SCAN', number=0), "does not store the scan of each point")):
         try:
             operator()
         except RuntimeError as error:

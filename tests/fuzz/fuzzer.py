@@ -19,6 +19,7 @@ import signal
 import sys
 import time
 import traceback
+import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -67,9 +68,9 @@ def attempt(reader: Reader, data: bytes, count: Count) -> str:
         count.refused, count.said = count.refused + 1, str(error)[:200]
         if not str(error).strip():
             return f"{type(error).__name__} without a sentence"
-        if any(not letter.isprintable() and letter not in "\n\t" for letter in str(error)):
+        if any(unicodedata.category(letter) in {"Cc", "Cs"} and letter not in "\n\t" for letter in str(error)):
             return f"control characters in {str(error)[:200]!r}"
-        if len(str(error)) > 3000:
+        if len(str(error)) > 5000:
             return f"a sentence of {len(str(error)):,} letters"
     except Late:
         return f"took longer than {WAIT} s"
