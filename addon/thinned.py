@@ -186,7 +186,10 @@ def _draw() -> None:
         return
     key = (context.view_layer.as_pointer(), budget)
     if key not in _drawn:
-        _drawn[key] = _look_up(context.evaluated_depsgraph_get(), budget)
+        depsgraph = context.view_layer.depsgraph  # as drawn: evaluating again within a redraw may end Blender
+        if depsgraph is None:
+            return
+        _drawn[key] = _look_up(depsgraph, budget)
     shown = [item for item in _drawn[key] if not item.cloud or space.shading.type != 'MATERIAL']
     if not shown:
         return
