@@ -141,7 +141,8 @@ class Bench(unittest.TestCase):
                 for name in (*gpu.COUNTS, "bytes"):
                     asked = sum(one[name] for one in row["work"].values())
                     self.assertLessEqual(asked, row["gl"][name], name)
-                    self.assertGreater(asked, row["gl"][name] // 2 if name not in ("empty", "waits") else -1, name)
+                    if name not in ("empty", "waits", "copies"):  # no pass needs these on a GPU
+                        self.assertGreater(asked, row["gl"][name] // 2, name)
             path = self.out / "README.md"
             path.write_text("<!-- bench gpu -->\nold\n<!-- end -->\n")
             readme.update(result, self.out)
