@@ -20,8 +20,15 @@ def name() -> str:
     """Blender's backend and device, as in "Vulkan, llvmpipe"."""
     if bpy.app.background and not hasattr(gpu, "init"):
         return "none"
-    backend = gpu.platform.backend_type_get() if hasattr(gpu.platform, "backend_type_get") else 'OPENGL'  # 3.5 and later tell
-    return f"{_NAMES.get(backend, backend)}, {gpu.platform.renderer_get()}"
+    return f"{_NAMES.get(_backend(), _backend())}, {gpu.platform.renderer_get()}"
+
+
+def _backend() -> str:
+    return gpu.platform.backend_type_get() if hasattr(gpu.platform, "backend_type_get") else 'OPENGL'  # 3.5 and later tell
+
+
+def is_vulkan() -> bool:
+    return _backend() == 'VULKAN'
 
 
 def _lacks(error: Exception) -> GraphicsError:
