@@ -752,7 +752,7 @@ static int replace_colors(struct build *build)
         cloud->colors = old;
         return PATINA_ERROR_MEMORY;
     }
-    cloud->info.invalid_colors = 0;
+    cloud->info.invalid_colors = cloud->info.uncolored = 0;
     for (uint32_t i = 0; i < pt_part_count(cloud); i++)
         cloud->info.invalid_colors += color_part(build, pt_part(cloud, i));
     cloud->info.bytes += (cloud->colors ? pt_color_bytes(cloud) : 0) - (old ? old_bytes : 0);

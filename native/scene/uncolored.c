@@ -25,7 +25,7 @@ struct search {
 
 static int is_absent(const struct patina_cloud *cloud, size_t slot)
 {
-    if (cloud->shapes && cloud->shapes[slot] & PT_SHAPE_UNCOLORED)
+    if (cloud->info.uncolored && cloud->shapes && cloud->shapes[slot] & PT_SHAPE_UNCOLORED)
         return 1;
     if (cloud->color_format == PT_COLOR_SRGB8) {
         const uint8_t *c = (const uint8_t *)cloud->colors + 3 * slot;
@@ -216,20 +216,33 @@ int pt_uncolored_find(struct pt_uncolored *job, struct pt_pool *pool)
     return error;
 }
 
+// Makes the shape words the cloud's own, so that they can be written: words of a mapped file cannot. Devices may hold the address of the
+// words before: the new state makes them take the new one. 0 or PATINA_ERROR_MEMORY.
+static int own_shapes(struct patina_cloud *cloud)
+{
+    const size_t size = cloud->slots * sizeof *cloud->shapes;
+    uint32_t *shapes = cloud->mapped >> PT_ARRAY_SHAPES & 1u ? pt_pages_alloc(size) : cloud->shapes;
+    if (!shapes)
+        return PATINA_ERROR_MEMORY;
+    if (shapes == cloud->shapes)
+        return PATINA_OK;
+    memcpy(shapes, cloud->shapes, size);
+    pt_pages_free(cloud->shapes, size);
+    cloud->shapes = shapes;
+    cloud->info.bytes += size;
+    cloud->mapped &= ~(1u << PT_ARRAY_SHAPES);
+    atomic_fetch_add(&cloud->alive->shapes, 1);
+    return PATINA_OK;
+}
+
 // After the colors of an analysed cloud were replaced: the same, with a tree of its own. Without memory they stay as they are.
 static void lend_again(struct patina_cloud *cloud, struct pt_pool *pool)
 {
-    const size_t size = cloud->slots * sizeof *cloud->shapes;
-    uint32_t *shapes = cloud->shapes && !cloud->part_count ? pt_pages_alloc(size) : NULL;
-    struct pt_uncolored job = {.cloud = cloud, .shapes = shapes, .least_level = pt_default_level(cloud->info.trusts)};
-    if (!shapes)
+    if (cloud->part_count || own_shapes(cloud))
         return;
+    struct pt_uncolored job = {.cloud = cloud, .shapes = cloud->shapes, .least_level = pt_default_level(cloud->info.trusts)};
     for (size_t slot = 0; slot < cloud->slots; slot++) // the bits are of the colors before
-        shapes[slot] = cloud->shapes[slot] & ~PT_SHAPE_UNCOLORED;
-    pt_pages_free(cloud->shapes, size);
-    cloud->shapes = shapes;
-    cloud->mapped &= ~(1u << PT_ARRAY_SHAPES);
-    cloud->info.uncolored = 0;
+        cloud->shapes[slot] &= ~PT_SHAPE_UNCOLORED;
     if (!pt_uncolored_find(&job, pool) && job.colors) {
         pt_pages_free(cloud->colors, pt_color_bytes(cloud));
         cloud->colors = job.colors;
