@@ -18,7 +18,7 @@ import bpy  # noqa: E402
 import fuzzer  # noqa: E402
 import harness  # noqa: E402
 import mutate  # noqa: E402
-from fuzzer import Reader  # noqa: E402
+from fuzzer import Reader, Refused  # noqa: E402
 from patina import native, styles  # noqa: E402
 from patina.importers.reading import told  # noqa: E402
 from patina.sync import kept  # noqa: E402
@@ -26,10 +26,6 @@ from patina.sync import kept  # noqa: E402
 os.environ["BLENDER_USER_SCRIPTS"] = str(harness.SCRATCH)
 GROUPS = {"scene": lambda: bpy.context.scene, "points": lambda: bpy.data.objects["points"], "layer": lambda: bpy.context.view_layer,
           "light": lambda: bpy.data.lights[0], "world": lambda: bpy.context.scene.world, "camera": lambda: bpy.context.scene.camera}
-
-
-class Refused(Exception):
-    pass
 
 
 def stage():
@@ -57,13 +53,6 @@ def style_read(data):
 
 def style_seeds():
     return [path.read_bytes() for path in sorted(styles.SHIPPED.glob("*.json"))]
-
-
-def json_change(data, chance, others):
-    try:
-        return mutate.json_bytes(json.loads(data), chance, others)
-    except (ValueError, RecursionError):
-        return mutate.change(data, chance, others, text=True)
 
 
 # ---- what a .blend holds
@@ -146,7 +135,7 @@ def draw(scene):
         failed = " ".join(str(error).split())
     for text in (failed, *(told(text) for _, text in harness.reports)):
         assert not OURS.search(text), text
-        assert all(ord(letter) > 31 and not 127 <= ord(letter) < 160 or letter in "\n\t" for letter in text), f"control characters in {text[:200]!r}"
+        assert not fuzzer.controls(text), f"control characters in {text[:200]!r}"
     if failed:
         raise Refused(failed[:1000])
 
@@ -204,10 +193,10 @@ def notes_read(data):
 
 
 READERS = {
-    "style": Reader(style_seeds, json_change, style_read, (styles.StyleError,)),
+    "style": Reader(style_seeds, mutate.json_change, style_read, (styles.StyleError,)),
     "blend": Reader(blend_seeds, blend_change, blend_read, (Refused, native.PatinaError), 0.3),
     "link": Reader(lambda: [b""], link_change, link_read, (Refused, native.PatinaError), 0.5),
-    "notes": Reader(notes_seeds, json_change, notes_read, (ValueError, OSError)),
+    "notes": Reader(notes_seeds, mutate.json_change, notes_read, (ValueError, OSError)),
 }
 
 arguments = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:] if Path(sys.argv[0]).name == Path(__file__).name else []

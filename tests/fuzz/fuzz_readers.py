@@ -30,18 +30,12 @@ import mutate  # noqa: E402
 import source  # noqa: E402
 import task  # noqa: E402
 import test_hostile as hostile  # noqa: E402
-from fuzzer import Reader  # noqa: E402
+from fuzzer import Reader, Refused  # noqa: E402
 from patina.importers import crs, scans  # noqa: E402
 
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-fuzz-"))
 PROGRAM = os.environ.get("PATINA_PROGRAM") or str(Path(os.environ["PATINA_LIBRARY"]).resolve().with_name("patina"))
 STARTS = 0.04  # share of runs of readers that start a process for each input
-
-
-def needs(*names):
-    lacking = [name for name in names if hostile.readers.lacks(name)]
-    if lacking:
-        raise hostile.Skip(f"{', '.join(lacking)} not installed for this Python")
 
 
 def points(ending, data):
@@ -165,11 +159,8 @@ def _ept_files(data):
 def ept_change(data, chance, others):
     files = _ept_files(data)
     which = chance.choice((0, 0, 1, 1, 2))
-    try:
-        files[which] = mutate.json_bytes(json.loads(files[which]), chance, []) if which < 2 and chance.random() < 0.7 else \
-            mutate.change(files[which], chance, [], text=which < 2)
-    except (ValueError, RecursionError):
-        files[which] = mutate.change(files[which], chance, [], text=True)
+    change = mutate.json_change if which < 2 and chance.random() < 0.7 else partial(mutate.change, text=which < 2)
+    files[which] = change(files[which], chance, [])
     return json.dumps([len(each) for each in files]).encode() + b"\n" + b"".join(files)
 
 
@@ -214,17 +205,6 @@ def job_seeds():
     blender = {"by": "blender", "program": "/usr/bin/blender", "scene": "Scene", "addon": [1, 0, 0], "frame": 1}
     converts = {"kind": "parts", "parts": 3, "convert": [["a.ply", str(SCRATCH / "job/clouds/1-a.cloud")]]}
     return [json.dumps(JOB | change).encode() for change in ({}, other, converts, other | blender, blender)]
-
-
-def json_change(data, chance, others):
-    try:
-        return mutate.json_bytes(json.loads(data), chance, others)
-    except (ValueError, RecursionError):
-        return mutate.change(data, chance, others, text=True)
-
-
-class Refused(Exception):
-    pass
 
 
 def job_read(data):
@@ -307,13 +287,13 @@ def cli_read(data):
     if any(b"/" in word or b"\\" in word for word in arguments):  # outside of the folder
         return
     done = subprocess.run([PROGRAM, *arguments], cwd=cli_folder(), capture_output=True, stdin=subprocess.DEVNULL, timeout=50, check=False,
-                          preexec_fn=partial(_limits))
-    said = done.stderr.decode("utf-8", "replace").strip()
+                          preexec_fn=_limits)
+    said = done.stderr.decode("utf-8", "replace").strip().replace("\r", " ")
     assert done.returncode in (0, 1, 2, 3), f"ended with {done.returncode}: {said[-200:]}"
     assert not done.returncode or said, f"ended with {done.returncode} and says nothing"
-    assert not any(ord(letter) < 32 and letter not in "\n\t\r" for letter in said), f"control characters: {said[:200]!r}"
+    assert not fuzzer.controls(said), f"control characters: {said[:200]!r}"
     if done.returncode:
-        raise Refused(said[-300:].replace("\r", " "))
+        raise Refused(said[-300:])
 
 
 def _limits():
@@ -334,15 +314,15 @@ def texts(data, chance, others):
 OURS = (hostile.native.PatinaError,)
 READERS = {
     "las": Reader(las_seeds, packed, partial(points, ".las"), OURS),
-    "laz": Reader(laz_seeds, laz_change, partial(points, ".laz"), OURS, STARTS, lambda: needs("lazrs")),
+    "laz": Reader(laz_seeds, laz_change, partial(points, ".laz"), OURS, STARTS, lambda: hostile.needs("lazrs")),
     "pcd": Reader(pcd_seeds, texts, partial(points, ".pcd"), OURS),
-    "e57": Reader(e57_seeds, e57_change, partial(points, ".e57"), OURS, STARTS, lambda: needs("pye57", "pyquaternion")),
-    "e57_xml": Reader(e57_seeds, e57_change, e57_xml, (hostile.e57_xml.E57Error,), 1.0, lambda: needs("pye57", "pyquaternion")),
+    "e57": Reader(e57_seeds, e57_change, partial(points, ".e57"), OURS, STARTS, lambda: hostile.needs("pye57", "pyquaternion")),
+    "e57_xml": Reader(e57_seeds, e57_change, e57_xml, (hostile.e57_xml.E57Error,), 1.0, lambda: hostile.needs("pye57", "pyquaternion")),
     "crs": Reader(crs_seeds, texts, crs_read, ()),
-    "copc": Reader(lambda: [copc_seed()], copc_change, copc_read, (source.SourceError,), 1.0, lambda: needs("lazrs")),
+    "copc": Reader(lambda: [copc_seed()], copc_change, copc_read, (source.SourceError,), 1.0, lambda: hostile.needs("lazrs")),
     "ept": Reader(ept_seeds, ept_change, ept_read, (source.SourceError,), 0.5),
-    "scans": Reader(scans_seeds, json_change, scans_read, ()),
-    "job": Reader(job_seeds, json_change, job_read, (Refused,)),
+    "scans": Reader(scans_seeds, mutate.json_change, scans_read, ()),
+    "job": Reader(job_seeds, mutate.json_change, job_read, (Refused,)),
     "cli": Reader(lambda: [line.replace(" ", "\n").encode() for line in SEEDS], cli_change, cli_read, (Refused,), 2 * STARTS,
                   lambda: subprocess.run([PROGRAM, "version"], check=True, capture_output=True)),
 }

@@ -52,6 +52,15 @@ class Late(BaseException):
     pass
 
 
+class Refused(Exception):
+    """What a reader raises that has no error of its own."""
+
+
+def controls(text: str) -> bool:
+    """Whether text has control characters, which a terminal may obey, or halves of characters."""
+    return any(unicodedata.category(letter) in {"Cc", "Cs"} and letter not in "\n\t" for letter in text)
+
+
 def _late(_signal: int, _frame: object) -> None:
     raise Late
 
@@ -68,7 +77,7 @@ def attempt(reader: Reader, data: bytes, count: Count) -> str:
         count.refused, count.said = count.refused + 1, str(error)[:200]
         if not str(error).strip():
             return f"{type(error).__name__} without a sentence"
-        if any(unicodedata.category(letter) in {"Cc", "Cs"} and letter not in "\n\t" for letter in str(error)):
+        if controls(str(error)):
             return f"control characters in {str(error)[:200]!r}"
         if len(str(error)) > 5000:
             return f"a sentence of {len(str(error)):,} letters"
@@ -121,7 +130,7 @@ def main(readers: dict[str, Reader], arguments: list[str]) -> int:
     parser.add_argument("--runs", type=int, default=0, help="changed inputs of each reader; 0 with --seconds: any number")
     parser.add_argument("--seed", type=int, default=49)
     parser.add_argument("--keep", type=Path, help="a folder for inputs that fail")
-    parser.add_argument("readers", nargs="*")
+    parser.add_argument("readers", nargs="*", choices=[*readers, []], metavar="READER")
     options = parser.parse_args(arguments)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
     signal.signal(signal.SIGALRM, _late)

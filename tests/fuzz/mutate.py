@@ -111,7 +111,10 @@ def _in_json(value: Any, chance: random.Random) -> Any:
     return value
 
 
-def json_bytes(value: Any, chance: random.Random, others: list[bytes]) -> bytes:
-    """A changed value as a text, which is now and then damaged too."""
-    text = json.dumps(change_json(value, chance)).encode("utf-8", "surrogatepass")
+def json_change(data: bytes, chance: random.Random, others: list[bytes]) -> bytes:
+    """A text of JSON with changed values, which is now and then damaged too; any other text with a few changes."""
+    try:
+        text = json.dumps(change_json(json.loads(data), chance)).encode("utf-8", "surrogatepass")
+    except (ValueError, RecursionError):
+        return change(data, chance, others, text=True)
     return change(text, chance, others, text=True) if chance.random() < 0.15 else text
