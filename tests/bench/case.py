@@ -18,13 +18,12 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2] / "addon"), str(Path(__f
 import machine  # noqa: E402
 import metrics  # noqa: E402
 import stage as stages  # noqa: E402
-from modes import LAYERS, MODES, QUALITIES, Mode, fill_scene  # noqa: E402
+from modes import ALL_PASSES, COLOR_AND_DEPTH, LAYERS, MODES, QUALITIES, Mode, scene_of  # noqa: E402
 
 import native  # noqa: E402  the add-on's binding, the only one there is
 
 WARM_UP = 4
 PATIENCE = 6.0  # seconds of frames, after which a slow case stops at five
-COLOR_AND_DEPTH, ALL_PASSES = 3, 0  # patina_settings.passes
 STEADY_FRAMES, STEADY_STEP = 8, 0.05  # pictures and degrees between them: a third of a pixel at 1024
 
 
@@ -101,13 +100,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
     machine.reset_peak()
 
     def make(turn: float, passes: int = COLOR_AND_DEPTH) -> native.Scene:
-        scene = native.Scene()
-        fill_scene(scene, cloud, shown, mode, turn)
-        scene.set_settings(width=case["width"], height=case["height"], film_transparent=1, world_color=[0.05] * 3,
-                           passes=passes, **{**QUALITIES[case["quality"]], **mode.settings})
-        scene.set_effects(**mode.effects)
-        scene.set_camera(**shown.camera(turn).fields())
-        return scene
+        return scene_of(cloud, shown, mode, (case["width"], case["height"]), turn, passes=passes, **QUALITIES[case["quality"]])
 
     frame = native.Frame(device)
     timing = frames(frame, make, case["frames"])

@@ -15,6 +15,7 @@ sys.path[:0] = [str(ROOT / "addon"), str(Path(__file__).resolve().parent)]
 import case as cases  # noqa: E402
 import metrics  # noqa: E402
 import stage as stages  # noqa: E402
+from modes import MODES, scene_of  # noqa: E402
 
 import native  # noqa: E402
 
@@ -33,12 +34,8 @@ def rendered(frame: native.Frame, name: str, density: float, shape: dict[str, An
              ) -> tuple[dict[str, Any], dict[str, float]]:
     """Statistics of a picture and its errors, in the units of patina_expected_error. shape: what more stage_of takes."""
     shown = stages.stage_of({"surface": name, "points": stages.density_count(name, density, SIZE), **(shape or {})})
-    scene = native.Scene()
     cloud = native.Cloud(shown.position, shown.normal, shown.color)
-    cases.fill_scene(scene, cloud, shown, cases.MODES["surface"], 0.0)
-    scene.set_settings(width=SIZE, height=SIZE, film_transparent=1, world_color=[0.05] * 3, **settings)
-    scene.set_camera(**shown.camera(0.0).fields())
-    frame.render(scene)
+    frame.render(scene_of(cloud, shown, MODES["surface"], (SIZE, SIZE), 0.0, **settings))
     off = metrics.errors(shown.exact(0.0, SIZE, SIZE), cases.picture(frame), shown.spacing)
     return frame.stats(), {"color": 10.0 ** (-off["color_psnr"] / 20.0), "coverage": 1.0 - off["coverage_iou"],
                            "depth": off.get("depth_rms_spacings", 0.0), "normal": off.get("normal_mean_degrees", 0.0)}

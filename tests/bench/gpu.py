@@ -31,7 +31,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2] / "addon"), str(Path(__f
 
 import machine  # noqa: E402
 import stage as stages  # noqa: E402
-from modes import MODES, QUALITIES, Mode, fill_scene  # noqa: E402
+from modes import COLOR_AND_DEPTH, MODES, QUALITIES, Mode, scene_of  # noqa: E402
 from native.abi import SOFT, SOFT_MODEL, SURFACE  # noqa: E402
 from native.points import ScanSet  # noqa: E402
 from tables import count, joined, table  # noqa: E402
@@ -53,11 +53,10 @@ KNOWN = {**MODES, **OWN}
 WHATS = ("surface", "6 layers", "shadows 10", "discs", SOFT_POINTS, RANGES, "shadows kept", "shadows 1", "lines 2", "eye-dome lighting",
          "ambient obscurance", "depth of field")  # the most important first
 SIZES = {"1024x1024": (1024, 1024), "1920x1080": (1920, 1080), "4096x4096": (4096, 4096)}
-COLOR_AND_DEPTH = 3  # patina_settings.passes
 WARM_UP, MEASURED = 3, 5  # frames before those that are timed; frames that are measured, behind them
 PATIENCE = 2.5  # seconds of frames of a device, after which a slow case stops at three
 COUNTS = ("dispatches", "empty", "barriers", "calls", "copies", "waits")
-HALF_OF_COLORS = 2e-5  # TOL_COLOR of tests/tolerances.h: colours of devices may differ by this share of the brightest
+TOL_COLOR = 2e-5  # as in tests/tolerances.h: colors of devices may differ by this share of the brightest
 GOALS = {  # ms on an H100 or H200: (points, width, what)
     (1_000_000, 1024, "surface"): 0.6, (10_000_000, 1024, "surface"): 0.9, (100_000_000, 1024, "surface"): 4.0,
     (1_000_000, 4096, "surface"): 2.0, (1_000_000, 1024, "discs"): 1.5, (1_000_000, 1024, "6 layers"): 2.5,
@@ -131,18 +130,13 @@ class Subject:
         _arrays.clear()
 
     def scene(self, what: str, size: tuple[int, int], turn: float) -> native.Scene:
-        scene, mode = native.Scene(), KNOWN[what]
+        mode = KNOWN[what]
         if what == RANGES and not self.scans:
             of = np.argmax(self.stage.normal @ WAYS.T, axis=1).astype(np.uint16)
             self.scans = ScanSet(self.cloud, of, [(-way, self.stage.spacing) for way in WAYS])
         if what == RANGES:
             mode = replace(mode, style={"scans": self.scans})
-        fill_scene(scene, self.cloud, self.stage, mode, turn)
-        scene.set_settings(width=size[0], height=size[1], film_transparent=1, world_color=[0.05] * 3, passes=COLOR_AND_DEPTH,
-                           **({} if "surface" in mode.settings else QUALITIES["refined"]), **mode.settings)
-        scene.set_effects(**mode.effects)
-        scene.set_camera(**self.stage.camera(turn).fields())
-        return scene
+        return scene_of(self.cloud, self.stage, mode, size, turn, passes=COLOR_AND_DEPTH, **QUALITIES["refined"])
 
     def may(self, what: str) -> bool:
         return what != RANGES or self.stage.normal is not None
@@ -184,7 +178,7 @@ def agreement(a: native.Frame, b: native.Frame) -> dict[str, Any]:
     brightest = max(1.0, float(np.abs(others).max()))
     far = float(np.abs(colors - others).max()) / brightest
     keys = int(np.count_nonzero(a.read_keys() != b.read_keys()))
-    return {"keys_differ": keys, "colors_differ": far, "same": keys == 0 and far <= HALF_OF_COLORS}
+    return {"keys_differ": keys, "colors_differ": far, "same": keys == 0 and far <= TOL_COLOR}
 
 
 def _row(subject: Subject, what: str, size: tuple[int, int], device: native.Device, asked: str, threads: int, frame: native.Frame,

@@ -23,6 +23,7 @@ QUALITIES = {"refined": {"quality": 0, "fill": 0}, "paper": {"quality": 1, "fill
              "averaged": {"average": 1},  # the same, means of the points about a surface
              "known discs": {"surface": 1, "depth": 1},  # the same as discs, their depth of the surface
              "final": {"pixel_samples": 16, "depth": 1}}  # the same, for final pictures
+COLOR_AND_DEPTH, ALL_PASSES = 3, 0  # patina_settings.passes
 LAYERS = 8  # rays through the nested tori meet up to eight surfaces
 
 
@@ -68,8 +69,11 @@ MODES = {
 MODES |= {name: Mode(effects=effects) for name, effects in CUES.items()}
 
 
-def fill_scene(scene: native.Scene, cloud: native.Cloud, shown: stages.Stage, mode: Mode, turn: float) -> None:
-    """Adds cloud, lights and lines. Lights that cast shadows turn too, unless the mode lets them be."""
+def scene_of(cloud: native.Cloud, shown: stages.Stage, mode: Mode, size: tuple[int, int], turn: float,
+             **settings: Any) -> native.Scene:
+    """What a mode shows of a cloud, seen by the stage's camera after a turn of so many degrees. Lights that cast shadows turn too, unless
+    the mode keeps them still. settings: of patina_settings; the mode's come first."""
+    scene = native.Scene()
     scene.add_cloud(cloud, **{**shown.style, **mode.style})
     if mode.lines:
         scene.set_lines(**mode.lines)
@@ -80,3 +84,8 @@ def fill_scene(scene: native.Scene, cloud: native.Cloud, shown: stages.Stage, mo
             x, y, z = light["direction"]
             light["direction"] = [c * x - s * y, s * x + c * y, z]
         scene.add_light(**light)
+    scene.set_settings(width=size[0], height=size[1], film_transparent=1, world_color=[0.05] * 3,
+                       **{**settings, **mode.settings})
+    scene.set_effects(**mode.effects)
+    scene.set_camera(**shown.camera(turn).fields())
+    return scene

@@ -19,6 +19,7 @@ import case as cases  # noqa: E402
 import metrics  # noqa: E402
 import numpy as np  # noqa: E402
 import stage as stages  # noqa: E402
+from modes import ALL_PASSES, COLOR_AND_DEPTH  # noqa: E402
 from native.points import ScanSet  # noqa: E402
 from tables import table  # noqa: E402
 from truth import look, orbit, scenes  # noqa: E402
@@ -149,7 +150,7 @@ def real(name: str) -> Scans | None:
 def _drawn(scans: Scans, cloud: native.Cloud, known: ScanSet | None, device: native.Device, frames: int, style: dict[str, Any],
            settings: dict[str, Any]) -> dict[str, Any]:
     """Times, and the error where there is a truth."""
-    def make(turn: float, passes: int = cases.COLOR_AND_DEPTH) -> native.Scene:
+    def make(turn: float, passes: int = COLOR_AND_DEPTH) -> native.Scene:
         scene = native.Scene()
         scene.add_cloud(cloud, scans=known, **{**scans.stage.style, **style})
         for light in scans.stage.lights:
@@ -160,7 +161,7 @@ def _drawn(scans: Scans, cloud: native.Cloud, known: ScanSet | None, device: nat
 
     frame = native.Frame(device)
     found = cases.frames(frame, make, frames)
-    frame.render(make(0.0, cases.ALL_PASSES))
+    frame.render(make(0.0, ALL_PASSES))
     if scans.stage.scene is not None and "transparency" not in style:
         found["error"] = metrics.errors(scans.stage.exact(0.0, SIZE, SIZE), cases.picture(frame), scans.interval)
     return found

@@ -10,9 +10,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-import case  # noqa: E402
 import metrics  # noqa: E402
 import stage  # noqa: E402
+from modes import MODES, scene_of  # noqa: E402
 
 import native  # noqa: E402
 
@@ -33,11 +33,7 @@ class Samples(unittest.TestCase):
             cloud.analyse()
         exact, found = shown.exact(0.0, SIZE, SIZE), []
         for samples in SAMPLES:
-            with native.Scene() as scene:
-                case.fill_scene(scene, cloud, shown, case.MODES["surface"], 0.0)
-                scene.set_settings(width=SIZE, height=SIZE, film_transparent=1, world_color=[0.05] * 3, passes=1,
-                                   pixel_samples=samples, **settings)
-                scene.set_camera(**shown.camera(0.0).fields())
+            with scene_of(cloud, shown, MODES["surface"], (SIZE, SIZE), 0.0, passes=1, pixel_samples=samples, **settings) as scene:
                 self.frame.render(scene)
             found.append(metrics.seen(exact, metrics.Shown(self.frame.read("COMBINED")))["color_psnr"])
         print(f"  {shape:8} {density:4} points a pixel{' ' * bool(settings)}{settings or ''}: " +
