@@ -58,9 +58,9 @@ static void round_of(patina_device *device, uint32_t count, struct image out, st
     assert_true(drawn >= count / 2);
 }
 
-static void soak(patina_device *device, const char *name, uint32_t whole)
+static void soak(patina_device *device, const char *name)
 {
-    const uint32_t count = soak_count(whole) / ROUNDS + 1;
+    const uint32_t count = soak_count(RENDERS) / ROUNDS + 1;
     struct image out = image(), first = image(), last = image();
     struct usage before = {0};
     if (support_is_gl(name))
@@ -88,7 +88,7 @@ static void test_renders(void **state)
         const char *name = support_device_name(i);
         patina_device *device = support_device_open(name, 2, 0);
         if (device)
-            soak(device, name, RENDERS);
+            soak(device, name);
         patina_device_destroy(device);
     }
     random_scenes_end();

@@ -35,7 +35,6 @@ static uint32_t entries(const char *path)
 // ---- objects of OpenGL -------------------------------------------------------------------------------------------------
 
 static atomic_int alive, lose_after;
-static struct pt_gl_device *watched;
 static GladGLContext driver;
 
 static void GLAD_API_PTR gen_buffers(GLsizei n, GLuint *names)
@@ -111,8 +110,7 @@ void usage_watch(patina_device *device)
     struct patina_device_info info = {.struct_size = sizeof info};
     assert_int_equal(patina_device_get_info(device, &info), PATINA_OK);
     assert_int_equal(strncmp(info.name, "gl-", 3), 0);
-    watched = (struct pt_gl_device *)device;
-    GladGLContext *gl = &watched->counter.driver; // its thread waits for a call
+    GladGLContext *gl = &((struct pt_gl_device *)device)->counter.driver; // its thread waits for a call
     driver = *gl;
     gl->GenBuffers = gen_buffers;
     gl->GenTextures = gen_textures;
