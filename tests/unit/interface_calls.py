@@ -12,9 +12,6 @@ from interface_stage import CODES, DESTROYS, SIDE, Stage, abi
 DRAWN = 0.25  # seconds, after which a picture is cancelled
 ORDERS = 150
 THREADS, SECONDS_OF_THREADS = 2, 6.0
-# from any thread at any time
-ANY_TIME = ("patina_frame_cancel", "patina_frame_progress", "patina_progress_cancel", "patina_progress_value", "patina_message",
-            "patina_log_next")
 NEVER = {"patina_progress_cancel", "patina_frame_cancel"}
 
 
@@ -60,31 +57,42 @@ def try_call(stage: Stage, function: str, parameters: list, place: int = -1, arg
     return result
 
 
-def renew(stage: Stage, function: str) -> None:
+def drop(stage: Stage, kind: str) -> None:
+    """Destroys the stage's handle of a kind, so that the next one is new."""
+    if kind in stage.handles:
+        getattr(stage.library, f"patina_{'cloud' if kind == 'pages' else kind}_destroy")(stage.handles.pop(kind))
+
+
+def renew(stage: Stage) -> None:
     """The handles that a function uses up or changes, as new."""
     for kind in ("builder", "rows", "task", "pages"):
-        if kind in stage.handles:
-            handle = stage.handles.pop(kind)
-            getattr(stage.library, f"patina_{'cloud' if kind == 'pages' else kind}_destroy")(handle)
+        drop(stage, kind)
     if "scene" in stage.handles:
         stage.set_scene(stage.handles["scene"])
+
+
+def returns_code(function: str) -> bool:
+    return abi.RESULTS.get(function, ctypes.c_int) is ctypes.c_int and function != "patina_task_done"
+
+
+def check_result(function: str, result: object) -> None:
+    assert not returns_code(function) or result in CODES, (function, result)
 
 
 def try_orders(stage: Stage, all_of_them: dict, tell: object) -> int:
     """Good calls in any order: of what was never drawn, of what is over, twice."""
     random.seed(49)
-    usable = [name for name in all_of_them if not name.endswith("_destroy") and name not in ("patina_progress_cancel", "patina_frame_cancel")]
+    usable = [name for name in all_of_them if not name.endswith("_destroy") and name not in NEVER]
     for _ in range(ORDERS):
         way = []
         for kind in ("frame", "builder", "rows", "task"):
-            if kind in stage.handles:
-                getattr(stage.library, f"patina_{kind}_destroy")(stage.handles.pop(kind))
+            drop(stage, kind)
         stage.handles["frame"] = stage.make("patina_frame_create", stage.handle("device"))  # nothing was drawn in it
         for name in random.choices(usable, k=12):
             way.append(name.removeprefix("patina_"))
             tell(", ".join(way))
             result = try_call(stage, name, all_of_them[name])
-            assert abi.RESULTS.get(name, ctypes.c_int) is not ctypes.c_int or name == "patina_task_done" or result in CODES, result
+            check_result(name, result)
         if "scene" in stage.handles:
             stage.set_scene(stage.handles["scene"])
     return ORDERS
@@ -106,8 +114,7 @@ def try_pairs(stage: Stage, all_of_them: dict, tell: object) -> int:
         assert names, kind
         for first in names:
             for second in names:
-                if kind in stage.handles:
-                    getattr(stage.library, f"patina_{own}_destroy")(stage.handles.pop(kind))
+                drop(stage, kind)
                 if kind == "frame":
                     stage.handles["frame"] = stage.make("patina_frame_create", stage.handle("device"))
                 elif kind == "scene":
@@ -115,7 +122,7 @@ def try_pairs(stage: Stage, all_of_them: dict, tell: object) -> int:
                 for name in (first, second):
                     tell(f"{first}, {second}: {name}")
                     result = try_call(stage, name, all_of_them[name])
-                    assert abi.RESULTS.get(name, ctypes.c_int) is not ctypes.c_int or name == "patina_task_done" or result in CODES, result
+                    check_result(name, result)
                 tried += 1
         if kind == "scene":
             stage.set_scene(stage.handle("scene"))
@@ -153,7 +160,7 @@ def try_threads(stage: Stage, all_of_them: dict, tell: object) -> int:
             while time.monotonic() < end and not wrong:
                 for name in chance.choices(usable, k=6):
                     result = try_call(own, name, all_of_them[name])
-                    assert abi.RESULTS.get(name, ctypes.c_int) is not ctypes.c_int or name == "patina_task_done" or result in CODES, (name, result)
+                    check_result(name, result)
                     tried += 1
                 own.set_scene(own.handles["scene"])
                 own.call("patina_frame_keep_planes", own.handles["frame"], 0)

@@ -113,8 +113,7 @@ class Stage:
                             row=ctypes.addressof(self.zeros))
 
     def _pages_desc(self) -> abi.PagesDesc:
-        page = abi.Page((0, 0, 0), (1, 1, 1), .1, POINTS, abi.NO_PAGE) if hasattr(abi, "NO_PAGE") else \
-            abi.Page((0, 0, 0), (1, 1, 1), .1, POINTS, 0xFFFFFFFF)
+        page = abi.Page((0, 0, 0), (1, 1, 1), .1, POINTS, 0xFFFFFFFF)  # the last: PATINA_NO_PAGE
         self.kept.append(page)
         return abi.PagesDesc(pages=ctypes.addressof(page), page_count=1, color_type=abi.TYPE["UINT8"], has_normals=1, has_scalars=1,
                              has_classes=1)

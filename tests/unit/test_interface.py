@@ -22,8 +22,8 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from interface_calls import draw, renew, try_call, try_orders, try_pairs, try_threads  # noqa: E402
-from interface_stage import CODES, DESTROYS, Stage, abi, camel, declarations  # noqa: E402
+from interface_calls import check_result, draw, renew, returns_code, try_call, try_orders, try_pairs, try_threads  # noqa: E402
+from interface_stage import DESTROYS, Stage, abi, camel, declarations  # noqa: E402
 from names import chosen  # noqa: E402
 
 SECONDS = 300  # that a function may take with all of its cases
@@ -118,7 +118,6 @@ def cases_of(stage: Stage, function: str, parameters: list[tuple[str, str]]) -> 
 
 
 def try_function(stage: Stage, function: str, parameters: list, tell: object) -> int:
-    codes = abi.RESULTS.get(function, ctypes.c_int) is ctypes.c_int and function not in ("patina_task_done",)
     tried = 0
     if function.endswith("_destroy"):
         tell("NULL")
@@ -126,19 +125,19 @@ def try_function(stage: Stage, function: str, parameters: list, tell: object) ->
         return 1
     tell("good arguments")
     first = try_call(stage, function, parameters)
-    assert not codes or first in CODES, first
-    renew(stage, function)
+    check_result(function, first)
+    renew(stage)
     for what, place, argument in cases_of(stage, function, parameters):
         tell(what)
         result = try_call(stage, function, parameters, place, argument)
-        assert not codes or result in CODES, f"returned {result}"
+        check_result(function, result)
         if "scene_set" in function or "scene_add" in function:
             draw(stage)
-        renew(stage, function)
+        renew(stage)
         tried += 1
     tell("good arguments once more")
     again = try_call(stage, function, parameters)
-    assert not codes or again == first or first in (abi.ERROR["ERROR_CANCELLED"],), f"returned {again}, and {first} at first"
+    assert not returns_code(function) or again == first or first == abi.ERROR["ERROR_CANCELLED"], f"returned {again}, and {first} at first"
     return tried
 
 
