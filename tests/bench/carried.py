@@ -4,7 +4,7 @@ with the programs that it runs; there:
 
     ./carried/run [--seconds 300] [--out FOLDER] [--small] [--device NAME] [PART...]
 
-Parts, in order: first (one frame's passes, one picture on both devices), kernels (each against the reference and the processor), images
+Parts, in order: first (one frame's passes, one image on both devices), kernels (each against the reference and the processor), images
 (the same of whole frames), frames (1, 10, 100 million points in three sizes; layers, shadows, discs, soft points, range images), threads
 (the processor from one thread to all), rest (hard input, other scenes), large (a billion points, or as many as memory holds).
 
@@ -80,7 +80,7 @@ def _say_row(run: Run, row: dict[str, Any]) -> None:
         return
     threads = f", {row['threads']} threads" if row["threads"] else ""
     same = "" if "same" not in row else ", same as cpu" if row["same"] else (
-        f", DIFFERS from cpu: {row['keys_differ']} keys, colours by {row['colors_differ']:.1e}")
+        f", DIFFERS from cpu: {row['keys_differ']} keys, colors by {row['colors_differ']:.1e}")
     counts = ", ".join(f"{row['gl'][name]} {name}" for name in gpu.COUNTS) if "gl" in row else ""
     run.say(f"{row['group']}: {row['device']}{threads}, {row['points']:,} points, {row['width']} x {row['height']}, {row['what']}: "
             f"{row['ms_median']:.2f} ms ({row['ms_min']:.2f} to {row['ms_max']:.2f}){same}{', ' * bool(counts)}{counts}")

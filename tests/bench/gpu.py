@@ -173,7 +173,7 @@ def _timed(frame: native.Frame, make: Callable[[float], native.Scene], frames: i
 
 
 def agreement(a: native.Frame, b: native.Frame) -> dict[str, Any]:
-    """How far two frames of one scene differ: pixels whose keys do, and the greatest difference of colours, as a share of the brightest."""
+    """How far two frames of one scene differ: pixels whose keys do, and the greatest difference of colors, as a share of the brightest."""
     colors, others = a.read("COMBINED"), b.read("COMBINED")
     brightest = max(1.0, float(np.abs(others).max()))
     far = float(np.abs(colors - others).max()) / brightest
@@ -276,11 +276,11 @@ def markdown(result: dict[str, Any], few: bool = False) -> str:
     for row in drawn:
         gl, cpu = row["gl"], beside.get(_of(row))
         goal = GOALS.get((row["points"], row["width"], row["what"]))
-        same = "–" if "same" not in row else "same" if row["same"] else f"{row['keys_differ']} keys, colours {row['colors_differ']:.1e}"
+        same = "–" if "same" not in row else "same" if row["same"] else f"{row['keys_differ']} keys, colors {row['colors_differ']:.1e}"
         body.append([_of(row), f"{row['ms_median']:.2f}", f"{goal:g}" if goal else "–", f"{sum(row['passes'].values()):.2f}",
                      f"{gl['bytes'] / 1e6:.0f}", f"{gl['bytes'] / speed / 1e6:.3f}" if speed else "–", *(str(gl[name]) for name in COUNTS),
                      f"{cpu['ms_median']:.1f}" if cpu else "–", same])
-    text = table(["points, picture, what", "ms", "goal", "in passes", "MB", "floor, ms", *COUNTS, "processor, ms", "against it"], body)
+    text = table(["points, size, what", "ms", "goal", "in passes", "MB", "floor, ms", *COUNTS, "processor, ms", "against it"], body)
     return "\n\n".join([f"{drawn[0]['device_description']}. Floor: the bytes at {speed:.0f} GB/s, which a kernel that only writes reaches.", text,
                         *(f"{_of(row)}:\n\n{passes(row, speed)}" for row in drawn[: 1 if few else None])])
 
