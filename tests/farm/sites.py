@@ -2,13 +2,8 @@
 """What the farm's tests draw, and how they run a program. Python's own library only."""
 import random
 import subprocess
-import sys
-import traceback
 from math import cos, pi, sin
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from names import chosen  # noqa: E402
 
 
 def run(*arguments, code=0, cwd=None, env=None, timeout=300):
@@ -34,25 +29,3 @@ def write_site(path: Path, count: int = 30000, seed: int = 3) -> Path:
     columns += "".join(f"property uchar {channel}\n" for channel in ("red", "green", "blue"))
     path.write_text(f"ply\nformat ascii 1.0\nelement vertex {count}\n{columns}end_header\n{''.join(rows)}", encoding="ascii")
     return path
-
-
-def run_tests(tests: dict, names: list = ()) -> int:
-    """Every function test_*, or those whose names hold one of these; the closing line is the count."""
-    failed = skipped = 0
-    found = chosen([name for name in tests if name.startswith("test_")], names)
-    for name in found:
-        test = tests[name]
-        try:
-            reason = test()
-        except Exception:
-            failed += 1
-            print(f"FAILED {name}")
-            traceback.print_exc()
-            continue
-        if isinstance(reason, str):
-            skipped += 1
-            print(f"skip {name}: {reason}")
-        else:
-            print(f"ok {name}")
-    print(f"{len(found) - failed - skipped} passed, {failed} failed, {skipped} skipped")
-    return 1 if failed else 0

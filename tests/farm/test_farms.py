@@ -10,8 +10,11 @@ import tempfile
 import time
 from pathlib import Path
 
-from sites import run, run_tests, write_site
+from sites import run, write_site
 from slurm_cluster import Cluster, missing
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from runs import Skip, run_tests  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PATINA = str(Path(sys.argv[1] if len(sys.argv) > 1 else "build/out/release/patina").resolve())
@@ -186,7 +189,7 @@ def test_slurm_task_killed_node_down_part_missing():
 
 def test_openjd_draws():
     if not OPENJD.exists():
-        return f"{OPENJD} is not there"
+        raise Skip(f"{OPENJD} is not there")
     jobs = {"jd-film": animation("jd-film"), "jd-still": make("jd-still", "--tiles", "2x2", "-o", "jd-still.png", *SITE),
             "jd-cloud": make("jd-cloud", "--parts", "2", "--rounds", "2", "-o", "jd-cloud.png", "--convert", "site.ply", *SITE[1:])}
     for job in jobs.values():
@@ -258,7 +261,7 @@ def run_all(tasks):
 
 def test_flamenco_compiles_and_its_tasks_draw():
     if not shutil.which("node"):
-        return "no JavaScript engine: nodejs"
+        raise Skip("no JavaScript engine: nodejs")
     film = animation("fl-film")
     tasks = compiled(film)
     assert [each["name"] for each in tasks] == [f"frame-{i}" for i in range(1, 5)] and not any(each["dependencies"] for each in tasks)
@@ -285,7 +288,7 @@ def main():
         try:
             write_site(FOLDER / "site.ply", 12000)
             patina("convert", "site.ply", "site.cloud")
-            return run_tests(globals(), sys.argv[3:])
+            return run_tests(globals(), sys.argv[3:])[1] != 0
         finally:
             if CLUSTER is not None:
                 CLUSTER.close()

@@ -9,7 +9,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from sites import run, run_tests, write_site
+from sites import run, write_site
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from runs import run_tests  # noqa: E402
 
 PATINA = str(Path(sys.argv[1] if len(sys.argv) > 1 else "build/out/release/patina").resolve())
 FOLDER = Path()
@@ -253,7 +256,7 @@ def main():
         FOLDER = Path(folder)
         write_site(FOLDER / "site.ply")
         patina("convert", "site.ply", "site.cloud")
-        return run_tests(globals())
+        return run_tests(globals())[1] != 0
 
 
 if __name__ == "__main__":

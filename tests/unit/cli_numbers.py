@@ -9,6 +9,7 @@ import subprocess
 import time
 
 import cli
+from runs import Skip
 
 
 def test_stats_of_opengl():
@@ -16,8 +17,7 @@ def test_stats_of_opengl():
     cli.ball("asked.ply")
     if subprocess.run([*cli.PATINA, "render", "asked.ply", "-o", "asked.png", "--size", "8x8", "--device", "gl-egl"], capture_output=True,
                       cwd=cli.FOLDER, timeout=300, check=False).returncode:
-        print("skip stats_of_opengl: there is no OpenGL device here")
-        return
+        raise Skip("there is no OpenGL device here")
     frames = [json.loads(cli.run("render", "asked.ply", "--stats", "json", "--repeat", "1", "--size", "64x48", "--device", "gl-egl").stdout)["gl"]
               for _ in range(2)]
     assert frames[0] == frames[1], frames
@@ -34,8 +34,7 @@ def test_stats_of_passes():
         done = subprocess.run([*cli.PATINA, "render", "asked.ply", "--stats", "json", "--repeat", "2", "--size", "64x48", "--device", device],
                               capture_output=True, text=True, cwd=cli.FOLDER, timeout=300, check=False, env={**os.environ, "PATINA_GL_AS": "hardware"})
         if done.returncode and kind == "gl":
-            print("skip stats_of_passes: there is no OpenGL device here")
-            return
+            raise Skip("there is no OpenGL device here")
         stats = json.loads(done.stdout)
         assert {"scatter", "resolve", "fill", "tail"} <= stats["work"].keys() & stats["passes"].keys(), (device, stats["work"])
         assert "pixels" not in stats["passes"], stats["passes"]  # it is measured

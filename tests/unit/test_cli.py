@@ -5,7 +5,6 @@ runs a program of another system: test_cli.py "wine build/out/windows-x64/patina
 import os
 import sys
 import tempfile
-import traceback
 from pathlib import Path
 
 sys.dont_write_bytecode = True
@@ -20,25 +19,15 @@ import cli_pictures  # noqa: E402
 import cli_ranges  # noqa: E402
 import cli_trust  # noqa: E402
 import cli_usage  # noqa: E402
-from names import chosen  # noqa: E402
+from runs import run_tests  # noqa: E402
 
 
 def main():
-    passed, failed = 0, 0
     modules = (cli_analysis, cli_colors, cli_usage, cli_pictures, cli_borders, cli_numbers, cli_files, cli_ranges, cli_trust)
     tests = {name: test for module in modules for name, test in vars(module).items() if name.startswith("test_")}
     with tempfile.TemporaryDirectory() as folder:
         cli.FOLDER = Path(folder)
-        for name in chosen(tests, sys.argv[2:]):
-            try:
-                tests[name]()
-                passed += 1
-            except Exception:  # a test's failure is one line of the sum, whatever it is
-                print(f"FAILED {name}")
-                traceback.print_exc(file=sys.stdout)
-                failed += 1
-    print(f"{passed} passed, {failed} failed, 0 skipped")
-    return 1 if failed else 0
+        return run_tests(tests, sys.argv[2:])[1] != 0
 
 
 if __name__ == "__main__":

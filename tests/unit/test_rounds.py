@@ -7,11 +7,10 @@ import os
 import subprocess
 import sys
 import tempfile
-import traceback
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from names import chosen  # noqa: E402
+from runs import Skip, run_tests  # noqa: E402
 
 PATINA, TOWN = (str(Path(path).resolve()) for path in sys.argv[1:3])
 FOLDER = Path()  # a temporary one, set by main
@@ -50,10 +49,6 @@ def compare(what, beside, *arguments, device="cpu"):
     assert device != "cpu" or told["read"] <= fits["read"], (told, fits)  # without what is hidden
     assert peak < CAP + beside and peak < most - LEAST_SAVED, (peak, most)
     return told
-
-
-class Skip(Exception):
-    pass
 
 
 def test_filled():
@@ -104,23 +99,10 @@ def test_wrong_sizes():
 
 def main():
     global FOLDER
-    passed = failed = skipped = 0
     with tempfile.TemporaryDirectory() as folder:
         FOLDER = Path(folder)
         subprocess.run([TOWN, FOLDER / "town.cloud", str(ACROSS), str(QUARTER)], check=True, stdout=subprocess.DEVNULL)
-        for name in chosen([name for name in globals() if name.startswith("test_")], sys.argv[3:]):
-            try:
-                globals()[name]()
-                passed += 1
-                print(f"ok   {name}")
-            except Skip as reason:
-                skipped += 1
-                print(f"skip rounds/{name.removeprefix('test_')}: {reason}")
-            except Exception:
-                failed += 1
-                print(f"FAIL {name}\n{traceback.format_exc()}")
-    print(f"{passed} passed, {failed} failed, {skipped} skipped")
-    sys.exit(failed > 0)
+        sys.exit(run_tests(globals(), sys.argv[3:])[1] > 0)
 
 
 if __name__ == "__main__":

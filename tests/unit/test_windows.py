@@ -11,19 +11,14 @@ import subprocess
 import sys
 import tempfile
 import time
-import traceback
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from names import chosen  # noqa: E402
+from runs import Skip, run_tests  # noqa: E402
 
 PATINA, HERE = (str(Path(argument).resolve()) for argument in sys.argv[1:3])
 FOLDER = Path()  # a temporary one, set by main
 WINESERVER = shutil.which("wineserver") or "/usr/lib/wine/wineserver64"
-
-
-class Skip(Exception):
-    """The reason."""
 
 
 def run(*arguments, code=0, tool=("wine", PATINA)):
@@ -192,24 +187,13 @@ def compare_keys(screen):
 
 
 def main():
-    global FOLDER
-    passed = failed = skipped = 0
-    for name in chosen([name for name in globals() if name.startswith("test_")], sys.argv[3:]):
-        with tempfile.TemporaryDirectory() as scratch:
-            FOLDER = Path(scratch)
-            try:
-                globals()[name]()
-            except Skip as reason:
-                skipped += 1
-                print(f"skip {name}: {reason}", flush=True)
-            except Exception:  # noqa: BLE001
-                failed += 1
-                print(f"FAILED {name}\n{traceback.format_exc()}", flush=True)
-            else:
-                passed += 1
-                print(f"ok {name}", flush=True)
-    print(f"{passed} passed, {failed} failed, {skipped} skipped")
-    return failed != 0
+    """Runs each test in a folder of its own."""
+    with tempfile.TemporaryDirectory() as scratch:
+        def before():
+            global FOLDER
+            FOLDER = Path(tempfile.mkdtemp(dir=scratch))
+
+        return run_tests(globals(), sys.argv[3:], before)[1] != 0
 
 
 if __name__ == "__main__":
