@@ -73,11 +73,16 @@ def _frames(points: int, version: str, backend: str, library: Path) -> dict | st
     provided = subprocess.run([ROOT / "build/blender", version], capture_output=True, text=True, check=False)
     if provided.returncode:
         return (provided.stderr.strip().splitlines() or ["not there"])[-1]
-    command = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", provided.stdout.split()[-1]]
-    command += ["--gpu-backend", backend] if version != "3.4" else []
-    command += ["--enable-event-simulate", "--factory-startup", "--python", str(ROOT / "tests/blender/test_window.py"), "--", "frames"]
-    done = subprocess.run(command, env={**os.environ, "PATINA_LIBRARY": str(library), "PATINA_FIGURES_POINTS": str(points)}, capture_output=True,
-                          text=True, check=False)
+    command = [provided.stdout.split()[-1], *(["--gpu-backend", backend] if version != "3.4" else [])]
+    return _measured(command, "frames", points, library)
+
+
+def _measured(blender: list[str], what: str, points: int, library: Path) -> dict | str:
+    """The figures that tests/blender/test_window.py prints in a Blender; a text: why none."""
+    command = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", *blender, "--enable-event-simulate", "--factory-startup", "--python",
+               str(ROOT / "tests/blender/test_window.py"), "--", what]
+    environment = {**os.environ, "PATINA_LIBRARY": str(library), "PATINA_FIGURES_POINTS": str(points)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     found = [line for line in done.stdout.splitlines() if line.startswith('{"points"')]
     return json.loads(found[-1]) if found and not done.returncode else (done.stdout.strip().splitlines() or ["failed"])[-1]
 
@@ -86,14 +91,9 @@ def measure(points: int, library: Path) -> str:
     """A table, or "skip: " and why there is none."""
     if not shutil.which("blender") or not shutil.which("xvfb-run"):
         return "skip: needs Blender and xvfb-run (build/setup test)."
-    command = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", "blender", "--enable-event-simulate",
-               "--factory-startup", "--python", str(ROOT / "tests/blender/test_window.py"), "--", "figures"]
-    environment = {**os.environ, "PATINA_LIBRARY": str(library), "PATINA_FIGURES_POINTS": str(points)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    found = [line for line in done.stdout.splitlines() if line.startswith('{"points"')]
-    if done.returncode or not found:
-        return f"skip: {(done.stdout.strip().splitlines() or ['failed'])[-1]}"
-    got = json.loads(found[-1])
+    got = _measured(["blender"], "figures", points, library)
+    if isinstance(got, str):
+        return f"skip: {got}"
     head = (f"{got['points']:,} points, a view of {got['width']} × {got['height']} in a window of 1280 × 800, overlays hidden, "
             f"*{got['transform']}* view transform, Blender's settings of the factory else, the middle mouse button drags; while "
             f"moving {2.0 ** (got['strata'] - 6):.0%} of the points, a pixel for {got['shrink']} × {got['shrink']}.")
