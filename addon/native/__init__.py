@@ -308,6 +308,7 @@ class Cloud(_Handle):
         self.trusts = tuple(info.trusts)  # drawn points of each level of trust; see sync/trust.py
         self.trust_default = info.trust_default  # least trust of points that are drawn by default
         self.seen_through = info.seen_through  # points that a station saw through
+        self.uncolored = info.uncolored  # points with a color that their neighbors lent
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))
         self.radius_most = info.radius_most  # of points' own radii, object units; 0: they have none

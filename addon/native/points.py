@@ -26,13 +26,13 @@ class Mask(_Handle):
 
 class Grade(_Handle):
     """A cloud's own colors, changed by scan. scans: (count,) uint16, or None: all are of the first. grades: gain, gamma, saturation
-    and temperature of each. balance: (grades, 3) gains of red, green and blue before these, or None. PatinaError for a cloud without
-    colors."""
+    and temperature of each. balance: (grades, 3) gains of red, green and blue before these, or None. keep_colors: points that were
+    measured without a color are black. PatinaError for a cloud without colors."""
 
     _kind = "grade"
 
     def __init__(self, cloud: Cloud, scans: np.ndarray | None, grades: Sequence[Sequence[float]],
-                 balance: np.ndarray | None = None) -> None:
+                 balance: np.ndarray | None = None, keep_colors: bool = False) -> None:
         if scans is not None and (scans.dtype != np.uint16 or len(scans) != cloud.count or not scans.flags.c_contiguous):
             raise PatinaError("scans are a uint16 for each point")
         values = (abi.ScanGrade * len(grades))(*(abi.ScanGrade(*grade) for grade in grades))
@@ -40,7 +40,7 @@ class Grade(_Handle):
         if balance.shape != (len(grades), 3):
             raise PatinaError("balance has three gains for each scan")
         super().__init__(cloud._handle, None if scans is None else scans.ctypes.data, values, balance.ctypes.data, len(grades),
-                         blame=(cloud._handle,), create="patina_grade_create_balanced")
+                         int(keep_colors), blame=(cloud._handle,), create="patina_grade_create_balanced")
 
 
 def gains(cloud: Cloud, scans: np.ndarray, count: int, progress: Progress | None = None) -> np.ndarray:

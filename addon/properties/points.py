@@ -39,6 +39,9 @@ class PatinaPointsProperties(PropertyGroup):
     use_balance: BoolProperty(
         name="Balance Scans", override=_OVERRIDE, default=True,
         description="Match exposure and white balance of the scans where they overlap")
+    use_lent_colors: BoolProperty(
+        name="Color Uncolored Points", override=_OVERRIDE, default=True,
+        description="Give black points among colored ones the mean color of their trusted neighbors. Needs the analysis")
     scan: IntProperty(name="Scan", override=_OVERRIDE, default=0, min=0, options={'HIDDEN'}, description="Active scan in the list")
     class_number: IntProperty(name="Class", override=_OVERRIDE, default=2, min=0, max=255,
                               description="LAS class to select: 2 ground, 6 building, 7 noise")

@@ -79,6 +79,7 @@ class State:
     grades: tuple[tuple[int, Scan], ...] = ()  # by the scans' numbers
     hidden: tuple[int, ...] = ()
     balanced: bool = False  # scans are brought to each other; this alone is no edit
+    keeps_black: bool = False  # points without a color stay black; this alone is no edit
 
     def __bool__(self) -> bool:
         return bool(self.packed or self.grades or self.hidden)
@@ -133,7 +134,7 @@ def state_of(obj: bpy.types.Object) -> State:
     solo = any(item.solo for item in group.scans)
     hidden = tuple(number_of(item) for item in group.scans if item.hide or solo and not item.solo)
     balanced = group.use_balance and obj.patina.colors.source == 'OWN'
-    return State(packed_of(obj) if obj.patina.linked_file else "", grades, hidden, balanced)
+    return State(packed_of(obj) if obj.patina.linked_file else "", grades, hidden, balanced, not group.use_lent_colors)
 
 
 def number_of(item: bpy.types.PropertyGroup) -> int:
@@ -247,16 +248,18 @@ def has_selection(cloud: native.Cloud, state: State) -> bool:
 def grade_of(cloud: native.Cloud, state: State) -> Grade | None:
     """Any thread. None where there is nothing to grade."""
     balanced = state.balanced and 1 < len(cloud.scan_numbers) and cloud.count <= MOST_BALANCED
-    if not (state.grades or balanced) or not cloud.has_colors or cloud.stream:
+    keeps_black = state.keeps_black and cloud.uncolored > 0
+    if not (state.grades or balanced or keeps_black) or not cloud.has_colors or cloud.stream:
         return None
     scans, known = scans_of(cloud), dict(state.grades)
-    if cloud.scan_file and scans is None:
+    if cloud.scan_file and scans is None and not keeps_black:
         return None
     grades = [known.get(number, NEUTRAL) for number in cloud.scan_numbers] if scans is not None else [known.get(ALL, NEUTRAL)]
     gains = gains_of(cloud) if balanced and scans is not None else np.ones((len(grades), 3), np.float32)
-    if all(grade == NEUTRAL for grade in grades) and (gains == 1.0).all():
+    if all(grade == NEUTRAL for grade in grades) and (gains == 1.0).all() and not keeps_black:
         return None
-    return keep(cloud, ("grade", tuple(grades), gains.tobytes(), *_state_of(cloud)), lambda: Grade(cloud, scans, grades, gains))
+    return keep(cloud, ("grade", tuple(grades), gains.tobytes(), keeps_black, *_state_of(cloud)),
+                lambda: Grade(cloud, scans, grades, gains, keeps_black))
 
 
 def _state_of(cloud: native.Cloud) -> tuple:

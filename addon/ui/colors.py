@@ -35,6 +35,7 @@ class PATINA_PT_color(ColorPanel, Panel):
             if not obj.patina.linked_file:
                 layout.prop_search(obj.patina, "color_attribute", obj.data, "attributes", text="Attribute")
             layout.prop(obj.patina, "color", text="Fallback")
+            layout.prop(obj.patina.points, "use_lent_colors")
         if group.source == 'FIXED':
             layout.prop(obj.patina, "color")
         if group.source == 'SCALAR':

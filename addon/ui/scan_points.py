@@ -113,9 +113,10 @@ class PATINA_PT_scans(SidebarPanel, Panel):
     def draw(self, context: Context) -> None:
         layout, obj = self.layout, context.object
         group = obj.patina.points
-        row = layout.row()
-        row.active = obj.patina.colors.source == 'OWN'
-        row.prop(group, "use_balance")
+        column = layout.column()
+        column.active = obj.patina.colors.source == 'OWN'
+        column.prop(group, "use_balance")
+        column.prop(group, "use_lent_colors")
         layout.operator("object.patina_scans_color")
         layout.operator("object.patina_scans_list")
         if not group.scans:

@@ -58,6 +58,13 @@ static int read_plane(const struct patina_frame *frame, const char *call, uint64
     return read_crop(frame, call, keys);
 }
 
+// The cloud of an instance whose uncolored points show the colors that their neighbors lent, or NULL.
+static const struct patina_cloud *lent_cloud(const struct patina_frame *frame, uint32_t instance)
+{
+    const struct patina_cloud *cloud = pt_numbering_cloud(&frame->key_ids, instance);
+    return cloud && cloud->info.uncolored && !frame->key_ids.clouds[instance].keeps_black ? cloud : NULL;
+}
+
 // Points that were measured without a color, and show their neighbors', read 0.5 in SOURCE.
 static int mark_uncolored(const struct patina_frame *frame, float *pixels)
 {
@@ -65,8 +72,7 @@ static int mark_uncolored(const struct patina_frame *frame, float *pixels)
     uint32_t instance = 0, slot;
     int some = 0;
     for (uint32_t i = 0; i < frame->key_ids.count; i++) {
-        const struct patina_cloud *cloud = pt_numbering_cloud(&frame->key_ids, i);
-        some |= cloud && cloud->info.uncolored;
+        some |= lent_cloud(frame, i) != NULL;
     }
     if (!some || !frame->keys_valid)
         return PATINA_OK;
@@ -76,8 +82,8 @@ static int mark_uncolored(const struct patina_frame *frame, float *pixels)
     for (size_t i = 0; i < count && !error; i++) {
         if (pixels[i] != 1.0f || !pt_numbering_find(&frame->key_ids, (uint32_t)keys[i], &instance, &slot))
             continue;
-        const struct patina_cloud *cloud = pt_numbering_cloud(&frame->key_ids, instance);
-        if (cloud && cloud->info.uncolored && cloud->shapes[slot] & PT_SHAPE_UNCOLORED)
+        const struct patina_cloud *cloud = lent_cloud(frame, instance);
+        if (cloud && cloud->shapes[slot] & PT_SHAPE_UNCOLORED)
             pixels[i] = 0.5f;
     }
     free(keys);

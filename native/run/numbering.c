@@ -2,6 +2,7 @@
 #include "numbering.h"
 
 #include "base/platform.h"
+#include "scene/mask.h"
 
 #include <stdlib.h>
 
@@ -20,12 +21,14 @@ int pt_numbering_take(struct pt_numbering *numbering, const struct patina_scene 
         return PATINA_ERROR_MEMORY;
     for (; taken.count < scene->cloud_count; taken.count++) {
         const struct patina_cloud *cloud = scene->instances[taken.count].cloud;
+        const patina_grade *grade = scene->instances[taken.count].style.grade;
         const int first = pt_is_first_part(scene, taken.count); // the others' numbers are the whole's, too
         taken.clouds[taken.count] = (struct pt_numbered){.cloud = cloud,
                                                          .alive = cloud->alive,
                                                          .number = scene->instances[taken.count].number,
                                                          .first_point = first ? taken.points
-                                                                              : taken.clouds[taken.count - 1].first_point};
+                                                                              : taken.clouds[taken.count - 1].first_point,
+                                                         .keeps_black = grade && grade->keeps_black};
         if (plan)
             taken.clouds[taken.count].window = plan->ids.windows[taken.count];
         atomic_fetch_add(&cloud->alive->references, 1);

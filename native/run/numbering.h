@@ -12,6 +12,7 @@ struct pt_numbered {
     uint32_t number; // that callers have for the cloud, parts of one have the same
     struct pt_window window;
     uint64_t first_point; // where the caller's begin
+    int keeps_black;      // its grade leaves uncolored points black
 };
 
 // The instances of a scene, and the ids that a plan gave them.

@@ -8,6 +8,7 @@
 #include "base/elementary.h"
 #include "paged.h"
 #include "parts.h"
+#include "uncolored.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -95,6 +96,7 @@ static void grade_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
     const struct grading *grading = context;
     const struct patina_cloud *cloud = grading->cloud;
     const size_t size = pt_color_size(cloud->color_format);
+    const int black = grading->grade->keeps_black && cloud->info.uncolored && cloud->shapes;
     (void)thread;
     for (uint32_t c = begin; c < end; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
@@ -103,7 +105,9 @@ static void grade_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
             const struct tone *tone = scan < grading->tone_count && !grading->tones[scan].same ? &grading->tones[scan] : NULL;
             const char *from = (const char *)cloud->colors + slot * size;
             char *to = (char *)grading->grade->colors + slot * size;
-            if (!tone)
+            if (black && cloud->shapes[slot] & PT_SHAPE_UNCOLORED)
+                memset(to, 0, size);
+            else if (!tone)
                 memcpy(to, from, size);
             else if (cloud->color_format == PT_COLOR_SRGB8)
                 grade_bytes(grading, tone, (const uint8_t *)from, (uint8_t *)to);
@@ -162,7 +166,7 @@ static int set_tones(struct grading *grading, const patina_scan_grade *grades, c
 int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades, uint32_t count,
                         patina_grade **out)
 {
-    return patina_grade_create_balanced(cloud, scans, grades, NULL, count, out);
+    return patina_grade_create_balanced(cloud, scans, grades, NULL, count, 0, out);
 }
 
 // As those of a mask.
@@ -172,15 +176,17 @@ static int divide(struct patina_grade *grade, const patina_cloud *cloud)
     grade->parts = calloc(cloud->part_count, sizeof *grade->parts);
     for (uint32_t i = 0; grade->parts && i < cloud->part_count; i++) {
         const struct patina_cloud *part = pt_part(cloud, i);
-        grade->parts[i] = (struct patina_grade){
-            .alive = pt_alive_create(), .size = part->slots * size, .colors = (char *)grade->colors + part->first_slot * size};
+        grade->parts[i] = (struct patina_grade){.alive = pt_alive_create(),
+                                                .size = part->slots * size,
+                                                .colors = (char *)grade->colors + part->first_slot * size,
+                                                .keeps_black = grade->keeps_black};
         grade->part_count += grade->parts[i].alive != NULL;
     }
     return grade->part_count == cloud->part_count;
 }
 
 static int make_grade(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades, const float *balance,
-                      uint32_t count, patina_grade **out)
+                      uint32_t count, int keeps_black, patina_grade **out)
 {
     struct patina_grade *grade = calloc(1, sizeof *grade);
     struct pt_pool *pool = pt_pool_create(pt_pool_threads_for(0, cloud->slots), 0);
@@ -189,6 +195,7 @@ static int make_grade(const patina_cloud *cloud, const uint16_t *scans, const pa
         pt_handle_init(&grade->handle);
         grade->of = pt_alive_share(cloud);
         grade->alive = pt_alive_create();
+        grade->keeps_black = keeps_black;
         grade->size = cloud->slots * pt_color_size(cloud->color_format);
         grade->colors = pt_pages_alloc(grade->size + 4); // kernels read words
     }
@@ -215,15 +222,18 @@ static int make_grade(const patina_cloud *cloud, const uint16_t *scans, const pa
 }
 
 int patina_grade_create_balanced(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
-                                 const float *balance, uint32_t count, patina_grade **out)
+                                 const float *balance, uint32_t count, uint32_t keep_colors, patina_grade **out)
 {
     if (!out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: out is NULL");
     *out = NULL;
+    if (keep_colors > 1)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create_balanced: keep_colors %u is none of 0 and 1",
+                       keep_colors);
     int error = check(cloud, grades, balance, count);
     if (error || (error = pt_whole_enter(cloud, "patina_grade_create")))
         return error;
-    error = make_grade(cloud, scans, grades, balance, count, out);
+    error = make_grade(cloud, scans, grades, balance, count, (int)keep_colors, out);
     pt_paged_leave(cloud);
     return error;
 }

@@ -30,6 +30,7 @@ struct patina_grade {
     void *colors;               // in chunk order, in the cloud's own format
     struct patina_grade *parts; // as a mask's
     uint32_t part_count;
+    int keeps_black; // uncolored points are black, whatever color their neighbors lent them
 };
 
 enum { PT_FIELD_BINS = 256 }; // of a histogram

@@ -153,7 +153,7 @@ int tool_balance(const struct tool_stations *stations, const struct tool_color *
         balanced += gains[3 * i] != 1.0f || gains[3 * i + 1] != 1.0f || gains[3 * i + 2] != 1.0f;
     }
     if (!code && balanced)
-        code = patina_grade_create_balanced(cloud, stations->station, grades, gains, scans, out);
+        code = patina_grade_create_balanced(cloud, stations->station, grades, gains, scans, 0, out);
     free(gains);
     free(grades);
     return code;

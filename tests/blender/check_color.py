@@ -6,8 +6,9 @@ import struct
 
 import bpy
 import numpy as np
+from check_import import import_ply, write_ply
 from check_points import grid, pixel
-from harness import SCRATCH, add_points, check, check_close, drawn, linear, new_scene, render, reports
+from harness import SCRATCH, add_points, check, check_close, drawn, linear, new_scene, render, reports, stats
 from mathutils import Matrix, Vector
 from patina import native
 
@@ -177,6 +178,50 @@ def test_after_import():
         render()
         check(any("'nowhere'" in text for _, text in reports), f"reports {reports}, link {link}")
         os.unlink(path)
+
+
+def check_lent_colors(link):
+    """With Color Uncolored Points off, lent points are black and Source is 1 there; all other pixels stay, and it needs no analysis anew."""
+    scene = new_scene(64, 48)
+    scene.patina.smooth, scene.view_layers[0].patina.use_pass_source = 'OFF', True
+    side, rng = 90, np.random.default_rng(9)
+    v, u = (values.reshape(-1) for values in np.mgrid[:side, :side])
+    places = np.stack([(u / side - 0.5) * 4, (v / side - 0.5) * 4, np.full(u.shape, -4.0)], 1) + rng.uniform(-0.01, 0.01, (side * side, 3))
+    colors = np.where((rng.random(side * side) < 0.06)[:, None], 0, (200, 160, 120))
+    path = write_ply(f"lent_{link}.ply", [(axis, "f4", places[:, k]) for k, axis in enumerate("xyz")]
+                     + [(name, "u1", colors[:, k]) for k, name in enumerate(("red", "green", "blue"))])
+    obj, = import_ply(path, link=link)
+    obj.patina.lighting = 'UNLIT'
+    group = obj.patina.points
+    check(group.use_lent_colors, "on by default")
+    lent = render()
+    group.use_lent_colors = False
+    black = render()
+    check(not any(text.startswith("Analyzing") for text in stats), "analyzed again")
+    marked, measured = (lent["Source"][..., 0] == value for value in (0.5, 1.0))
+    check(marked.sum() > 30 and measured.sum() > 1000, f"{marked.sum()} and {measured.sum()} pixels")
+    check(lent["Combined"][marked][:, :3].min() > 0.1 and not black["Combined"][marked][:, :3].any(), "black where a color was lent")
+    check((black["Source"][marked] == 1.0).all() and not (black["Source"] == 0.5).any(), "Source")
+    check((black["Combined"][measured] == lent["Combined"][measured]).all(), "the others stay")
+    group.scans.add().gain = 0.5
+    dim = render()["Combined"]
+    check(not dim[marked][:, :3].any(), "black with a grade")
+    check_close(dim[measured][:, :3], 0.5 * lent["Combined"][measured][:, :3], 0.03, "graded")
+    group.scans.clear()
+    obj.patina.colors.source = 'FIXED'
+    fixed = render()["Combined"]
+    group.use_lent_colors = True
+    check((render()["Combined"] == fixed).all(), "one color for all points")
+    obj.patina.colors.source = 'OWN'
+    check((render()["Combined"] == lent["Combined"]).all(), "on again")
+
+
+def test_lent_colors():
+    check_lent_colors(False)
+
+
+def test_lent_colors_of_links():
+    check_lent_colors(True)
 
 
 def test_uncolored_points_take_their_neighbors_color():

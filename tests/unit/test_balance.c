@@ -186,7 +186,7 @@ static void test_many_scans(void **state)
     patina_scan_grade *grades = calloc(MANY, sizeof *grades);
     for (uint32_t i = 0; i < MANY; i++)
         grades[i] = (patina_scan_grade){1, 1, 1, 0};
-    CHECK(patina_grade_create_balanced(cloud, scan, grades, found, MANY, &grade), cloud);
+    CHECK(patina_grade_create_balanced(cloud, scan, grades, found, MANY, 0, &grade), cloud);
     patina_grade_destroy(grade);
     free(grades);
     free(found);

@@ -427,7 +427,7 @@ static void test_grades(void **state)
             CHECK(patina_cloud_set_colors(s->cloud, &array), s->cloud);
         patina_grade *grade = NULL;
         const float balance[12] = {1, 1, 1, 2, 1, 0.5f, 1, 1, 1, 0.25f, 0.75f, 1.5f};
-        CHECK(patina_grade_create_balanced(s->cloud, scans, grades, balance, 4, &grade), NULL);
+        CHECK(patina_grade_create_balanced(s->cloud, scans, grades, balance, 4, 0, &grade), NULL);
         patina_cloud_style style = {.lighting = PATINA_LIGHTING_UNLIT, .grade = grade};
         patina_scene *scene = scene_with(s, &style);
         struct picture picture = picture_render(device, scene, &s->camera, &s->settings);
@@ -479,7 +479,8 @@ static void test_refusals(void **state)
     assert_int_equal(patina_grade_create(s->cloud, NULL, &bad, 1, &grade), PATINA_ERROR_ARGUMENT);
     assert_int_equal(patina_grade_create(s->cloud, NULL, &good, 2000, &grade), PATINA_ERROR_ARGUMENT);
     const float dark[3] = {1, -1, 1};
-    assert_int_equal(patina_grade_create_balanced(s->cloud, NULL, &good, dark, 1, &grade), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_grade_create_balanced(s->cloud, NULL, &good, dark, 1, 0, &grade), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_grade_create_balanced(s->cloud, NULL, &good, NULL, 1, 2, &grade), PATINA_ERROR_ARGUMENT);
     CHECK(patina_mask_create(other->cloud, s->hidden, NULL, BYTES, &mask), NULL);
     CHECK(patina_grade_create(other->cloud, NULL, &good, 1, &grade), NULL);
     patina_scene *scene = NULL;

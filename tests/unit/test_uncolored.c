@@ -329,6 +329,60 @@ static void draw_again(patina_device *device, const char *name)
     free(w);
 }
 
+// A grade that keeps colors: uncolored points are black again, SOURCE is 1 there, and all others stay as they are.
+static void keep_black(patina_device *device, const char *name)
+{
+    const patina_camera camera = camera_perspective((const double[]){0.6, 0.6, 1.5}, (const double[]){0.6, 0.6, 0}, 50, 96, 96,
+                                                    0.1, 10);
+    patina_settings settings = settings_default(96, 96);
+    settings.antialias = PATINA_ANTIALIAS_OFF;
+    settings.smooth = PATINA_SMOOTH_OFF;
+    const patina_scan_grade bright = {2, 1, 1, 0};
+    for (int floats = 0; floats < 2; floats++) {
+        struct wall *w = wall_of(0.05, 7);
+        patina_cloud *cloud = cloud_of(w, floats, 1);
+        analyse(cloud, 1, 0);
+        struct picture pictures[2];
+        for (uint32_t keep = 0; keep < 2; keep++) {
+            patina_grade *grade = NULL;
+            CHECK(patina_grade_create_balanced(cloud, NULL, &bright, NULL, 1, keep, &grade), cloud);
+            const patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .grade = grade};
+            patina_scene *scene = scene_of(cloud, &style);
+            pictures[keep] = picture_render(device, scene, &camera, &settings);
+            patina_scene_destroy(scene);
+            patina_grade_destroy(grade);
+        }
+        const float *source[2] = {pictures[0].source, pictures[1].source};
+        uint32_t lent = 0, measured = 0;
+        for (uint32_t i = 0; i < 96 * 96; i++) {
+            const float *lit = pictures[0].combined + 4 * i, *dark = pictures[1].combined + 4 * i;
+            assert_true(source[1][i] != 0.5f);
+            if (source[0][i] == 0.5f) {
+                lent++;
+                assert_true(w->black[key_id(pictures[0].keys[i])] && source[1][i] == 1.0f);
+                assert_true(lit[0] > 0.1f && dark[0] == 0.0f && dark[1] == 0.0f && dark[2] == 0.0f);
+            } else if (source[0][i] == 1.0f) {
+                measured++;
+                assert_true(source[1][i] == 1.0f);
+                assert_memory_equal(lit, dark, 4 * sizeof *lit);
+            }
+        }
+        print_message("  %s, %s: %u pixels of uncolored points are black, %u of others stay\n", name,
+                      floats ? "floats" : "bytes", lent, measured);
+        assert_true(lent > 150 && measured > 3000);
+        picture_free(&pictures[0]);
+        picture_free(&pictures[1]);
+        patina_cloud_destroy(cloud);
+        free(w);
+    }
+}
+
+static void test_kept_black(void **state)
+{
+    (void)state;
+    support_each_device(keep_black);
+}
+
 static void test_drawn_again(void **state)
 {
     (void)state;
@@ -339,7 +393,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_reference),  cmocka_unit_test(test_again),       cmocka_unit_test(test_black_surfaces),
-        cmocka_unit_test(test_bad_colors), cmocka_unit_test(test_drawn_again),
+        cmocka_unit_test(test_bad_colors), cmocka_unit_test(test_drawn_again), cmocka_unit_test(test_kept_black),
     };
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);

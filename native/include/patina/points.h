@@ -38,8 +38,9 @@ typedef struct patina_scan_grade {
 PATINA_API int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
                                    uint32_t count, patina_grade **out);
 // The same; before its grade, the light of each scan is multiplied by three numbers, red, green and blue, 0..65504 each. NULL = none.
+// keep_colors: 1 = points that were measured without a color are black, whatever color an analysis lent them, and SOURCE is 1 there; else 0.
 PATINA_API int patina_grade_create_balanced(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
-                                            const float *balance, uint32_t count, patina_grade **out);
+                                            const float *balance, uint32_t count, uint32_t keep_colors, patina_grade **out);
 PATINA_API void patina_grade_destroy(patina_grade *grade);
 // Finds by how much the light of scans differs where they overlap, as with other exposures and white balances (SPEC 11), and writes what to
 // multiply it by: red, green and blue of each of `count` scans (1..65535), for patina_grade_create_balanced. The gains of scans that
