@@ -38,9 +38,16 @@ def enabled():
         memory.limit = 0
 
 
+def modules_of(packages):
+    """The names of those that are imported."""
+    return [name for name in sys.modules if name.split(".")[0] in packages]
+
+
 @contextlib.contextmanager
 def without_readers(*wanted):
-    """As on Debian's Blender: none of them is there. wanted: what is looked for in their place."""
+    """As on Debian's Blender: none of them is there. wanted: what is looked for in their place. Modules of these that were imported before
+    are not imported within, and come back whole."""
+    known = {name: sys.modules.pop(name) for name in modules_of(wanted)}
     packages, readers.PACKAGES = readers.PACKAGES, dict.fromkeys(wanted, "tests")
     place, preferences.readers_folder = preferences.readers_folder, lambda: FOLDER
     shutil.rmtree(FOLDER, ignore_errors=True)
@@ -49,8 +56,9 @@ def without_readers(*wanted):
     finally:
         readers.look_no_more_in(FOLDER)
         readers.PACKAGES, preferences.readers_folder = packages, place
-        for name in wanted:
-            sys.modules.pop(name, None)
+        for name in modules_of(wanted):
+            del sys.modules[name]
+        sys.modules.update(known)
 
 
 def wheel(name, folder="wheels", tag="py3-none-any", holds=None):
@@ -213,7 +221,7 @@ def test_a_package_of_another_python_is_missing():
     """The zip's lazrs holds modules of some Pythons. On another one it is missing, and what is installed then comes first."""
     with without_readers("lazrs"):
         packages, readers.PACKAGES = readers.PACKAGES, {"lazrs": "LAZ and COPC"}
-        kept, known = list(sys.path), {name: sys.modules.pop(name) for name in [*sys.modules] if name.split(".")[0] == "lazrs"}
+        kept = list(sys.path)
         foreign, own = SCRATCH / "foreign/lazrs", FOLDER / "lazrs"
         try:
             for place, suffix in ((foreign, ".cpython-39-x86_64-linux-gnu.so"), (own, importlib.machinery.EXTENSION_SUFFIXES[0])):
@@ -229,7 +237,6 @@ def test_a_package_of_another_python_is_missing():
             check(not readers.missing() and sys.path[0] == str(FOLDER), f"{readers.missing()}, {sys.path[:2]}")
         finally:
             sys.path[:], readers.PACKAGES = kept, packages
-            sys.modules.update(known)
             importlib.invalidate_caches()
 
 
