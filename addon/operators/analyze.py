@@ -14,6 +14,7 @@ from mathutils import Matrix, Vector
 from .. import jobs, native, point_data
 from ..importers import NORMAL_NAME, WHOLE, Progress
 from ..sync import analysis, analyzing, attributes, clouds, linked, losses
+from . import polls
 from .steps import Stepped
 
 # attribute → its type, the key of an element's values
@@ -120,11 +121,8 @@ class PATINA_OT_frame_points(Operator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        if context.scene.camera is None:
-            if hasattr(cls, "poll_message_set"):
-                cls.poll_message_set("the scene has no camera")
-            return False
-        return any(_has_points(obj) for obj in context.view_layer.objects)
+        return polls.allowed(cls, "the scene has no camera" if context.scene.camera is None else "") \
+            and any(_has_points(obj) for obj in context.view_layer.objects)
 
     def execute(self, context: Context) -> set[str]:
         depsgraph = context.evaluated_depsgraph_get()

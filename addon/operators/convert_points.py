@@ -10,6 +10,7 @@ from bpy.types import ID, Context, Object, Operator
 
 from .. import importers, point_data
 from ..sync import attributes
+from . import polls
 
 
 def why_not(obj: Object | None, kind: str) -> str:
@@ -162,10 +163,7 @@ class _Converting:
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        why = why_not(context.object, cls.kind)
-        if why and hasattr(cls, "poll_message_set"):
-            cls.poll_message_set(why)
-        return not why
+        return polls.allowed(cls, why_not(context.object, cls.kind))
 
     def execute(self, context: Context) -> set[str]:
         chosen = [obj for obj in {context.object: None, **dict.fromkeys(context.selected_objects)} if not why_not(obj, self.kind)]

@@ -16,6 +16,7 @@ from .. import importers, jobs, native
 from ..native.points import pick
 from ..sync import clips, clouds, edits, files, linked, sequence, style_of
 from ..sync.analyzing import ANALYSES
+from . import polls
 
 HOW = (('SET', "Set", "Select only these points", 0), ('ADD', "Extend", "Add to the selection", 1), ('SUB', "Subtract", "Remove from the selection", 2),
        ('AND', "Intersect", "Keep only selected points that are also in this group", 3))
@@ -62,10 +63,7 @@ class Editing:
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        why = editable(context.object)
-        if why and hasattr(cls, "poll_message_set"):
-            cls.poll_message_set(why)
-        return not why
+        return polls.allowed(cls, editable(context.object))
 
     def execute(self, context: Context) -> set[str]:
         obj = context.object

@@ -12,8 +12,8 @@ from bpy.types import Context, Event, Object, Operator, OperatorMousePath, WorkS
 
 from .. import native, sync
 from ..sync import edits
-from . import points
-from .points import HOW, Editing
+from . import points, polls
+from .points import HOW
 from .view_tools import OverView, Place, Seen, describe, is_view, place_of
 
 STEP = 3.0  # pixels between two corners of a lasso
@@ -47,7 +47,9 @@ class PATINA_OT_points_select(OverView, Operator):
                           description="Also select points hidden behind others")
     path: CollectionProperty(type=OperatorMousePath, options={'SKIP_SAVE', 'HIDDEN'})  # corners; of a box two
 
-    poll = Editing.poll
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return polls.allowed(cls, points.editable(context.object))
 
     def execute(self, context: Context) -> set[str]:
         outline = self._outline()

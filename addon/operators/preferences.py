@@ -14,6 +14,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native, preferences, readers
 from ..sync import cache, clouds
+from . import polls
 from .steps import Stepped
 
 PIP: list[str] | None = None  # in place of this Python's own
@@ -59,10 +60,8 @@ class PATINA_OT_install_readers(_Installing, Operator):
 
     @classmethod
     def poll(cls, _context: Context) -> bool:
-        if getattr(bpy.app, "online_access", True):
-            return True
-        cls.poll_message_set("Preferences > System > Network does not allow online access: install from files")  # Blender 4.2
-        return False
+        return polls.allowed(cls, "" if getattr(bpy.app, "online_access", True) else
+                             "Preferences > System > Network does not allow online access: install from files")  # Blender 4.2
 
     def invoke(self, context: Context, _event: Event) -> set[str]:
         self._invoked = True

@@ -10,7 +10,7 @@ from bpy.types import Context, Object, Operator
 from .. import importers, native, point_data
 from ..importers import scans
 from ..sync import attributes, edits, scans_of
-from . import points
+from . import points, polls
 
 LOOK = ("gain", "gamma", "saturation", "temperature", "hide", "solo")
 
@@ -49,10 +49,7 @@ class OfScans:
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        why = refused(context.object)
-        if why and hasattr(cls, "poll_message_set"):
-            cls.poll_message_set(why)
-        return not why
+        return polls.allowed(cls, refused(context.object))
 
     def execute(self, context: Context) -> set[str]:
         obj = context.object

@@ -12,6 +12,7 @@ from bpy.types import Context, Event, Operator, OperatorMousePath
 
 from .. import importers, native, sync
 from ..properties.brush import RADIUS, STRENGTH, THROUGH
+from . import polls
 from .soft_strokes import Stroke, swept, why_not, write
 from .view_tools import OverView, Place, is_view, place_of
 
@@ -37,10 +38,7 @@ class PATINA_OT_soft_brush(OverView, Operator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        why = why_not(context.object)
-        if why and hasattr(cls, "poll_message_set"):
-            cls.poll_message_set(why)
-        return not why
+        return polls.allowed(cls, why_not(context.object))
 
     def execute(self, context: Context) -> set[str]:
         places = [tuple(item.loc) for item in self.path]

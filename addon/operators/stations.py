@@ -9,7 +9,7 @@ from bpy.types import Context, Object, Operator
 from mathutils import Vector
 
 from ..importers import scans, told
-from . import scanner
+from . import polls, scanner
 
 PROPERTY = "patina_station"  # of an empty: the scan's number
 MOST = 1000  # at a time: Blender takes half a minute for 40,000 new objects
@@ -57,11 +57,8 @@ class PATINA_OT_add_stations(Operator):
     @classmethod
     def poll(cls, context: Context) -> bool:
         obj = context.object
-        why = ("" if obj is not None and missing(obj) else "the file does not say where its scanners stood"
-               if obj is None or not of(obj) else "all stations are there")
-        if why and hasattr(cls, "poll_message_set"):
-            cls.poll_message_set(why)
-        return not why
+        return polls.allowed(cls, "" if obj is not None and missing(obj) else "the file does not say where its scanners stood"
+                             if obj is None or not of(obj) else "all stations are there")
 
     def execute(self, context: Context) -> set[str]:
         obj = context.object

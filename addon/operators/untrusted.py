@@ -14,7 +14,7 @@ from bpy.types import Context, Object, Operator
 from .. import importers, native, point_data
 from ..sync import edits, trust
 from ..sync.analyzing import ANALYSES
-from . import points
+from . import points, polls
 from .points import HOW
 
 SELECTION = ".selection"  # point attribute of a PointCloud; without it all points are selected
@@ -31,10 +31,7 @@ class PATINA_OT_select_untrusted(Operator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        why = _why_not(context.object)
-        if why and hasattr(cls, "poll_message_set"):
-            cls.poll_message_set(why)
-        return not why
+        return polls.allowed(cls, _why_not(context.object))
 
     def execute(self, context: Context) -> set[str]:
         obj = context.object

@@ -291,7 +291,13 @@ def test_scans_of_old_and_damaged_caches():
 def test_refusals():
     """Sequences, other objects, a missing file."""
     new_scene()
-    check(not bpy.ops.object.patina_points_hide.poll(), "without an object")
+    for operator in (bpy.ops.object.patina_points_hide, bpy.ops.object.patina_points_select):
+        try:
+            operator()
+        except RuntimeError as error:
+            check("links no point file" in str(error), f"without an object: {error}")
+        else:
+            check(False, f"{operator} without an object")
     obj = scene_with_wall("gone_wall.ply")
     check(bpy.ops.object.patina_points_hide.poll(), "a linked cloud")
     check(bpy.ops.object.patina_points_hide() == {'CANCELLED'}, "nothing is selected")
