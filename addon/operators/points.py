@@ -43,7 +43,8 @@ def cloud_of(obj: Object, context: Context) -> native.Cloud:
     return jobs.finish(clouds.CACHE.obtain_linked(source, importers.Progress()))
 
 
-def combine(how: str, old: edits.Bits, new: edits.Bits) -> edits.Bits:
+def combine(how: str, old: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """Of two selections the one that `how` asks for. Both are edits.Bits, or bool."""
     return {'SET': lambda: new, 'ADD': lambda: old | new, 'SUB': lambda: old & ~new, 'AND': lambda: old & new}[how]()
 
 
@@ -54,6 +55,15 @@ def write(obj: Object, changed: edits.Edits) -> None:
     elif edits.PROPERTY in obj:
         del obj[edits.PROPERTY]
     obj.update_tag()
+
+
+def edits_of(operator: Operator, obj: Object, count: int) -> edits.Edits:
+    """The edits of an object's cloud of so many points. If they are damaged, they are reset with a warning."""
+    try:
+        return edits.for_cloud(edits.packed_of(obj), count) or edits.none(count)
+    except edits.Damaged as damaged:
+        operator.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}. The edits were reset")
+        return edits.none(count)
 
 
 class Editing:
@@ -70,7 +80,7 @@ class Editing:
         try:
             with ANALYSES.drawing():
                 cloud = cloud_of(obj, context)
-                old = self._old(obj, cloud)
+                old = edits_of(self, obj, cloud.count)
                 new = self.change(context, obj, cloud, old)
         except (native.PatinaError, OSError) as error:
             self.report({'ERROR'}, importers.told(f"Patina: '{obj.name}': {error}"))
@@ -84,13 +94,6 @@ class Editing:
     def came_back(self, old: edits.Edits) -> str:
         """What an operator says first."""
         return ""
-
-    def _old(self, obj: Object, cloud: native.Cloud) -> edits.Edits:
-        try:
-            return edits.for_cloud(edits.packed_of(obj), cloud.count) or edits.none(cloud.count)
-        except edits.Damaged as damaged:
-            self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}. The edits were reset")
-            return edits.none(cloud.count)
 
     def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits | None:
         raise NotImplementedError

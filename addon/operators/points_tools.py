@@ -73,11 +73,7 @@ class PATINA_OT_points_select(OverView, Operator):
             except native.PatinaError as error:  # others can be
                 self.report({'WARNING'}, points.importers.told(f"Patina: '{obj.name}': {error}"))
                 continue
-            try:
-                old = edits.for_cloud(edits.packed_of(obj), count) or edits.none(count)
-            except edits.Damaged as damaged:
-                self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}. The edits were reset")
-                old = edits.none(count)
+            old = points.edits_of(self, obj, count)
             new = replace(old, selected=points.combine(self.how, old.selected, bits))
             points.write(obj, new)
             told.append(points.said(new))

@@ -35,14 +35,15 @@ class PATINA_OT_select_untrusted(Operator):
 
     def execute(self, context: Context) -> set[str]:
         obj = context.object
+        least = trust.least_of(obj.patina)
         try:
             cloud = trust.analyzed_cloud(obj, context.scene)
             with ANALYSES.drawing():
-                found = trust.untrusted(cloud, trust.least_of(obj.patina))
+                found = trust.untrusted(cloud, least)
         except (native.PatinaError, OSError) as error:
             self.report({'ERROR'}, importers.told(f"Patina: '{obj.name}': {error}"))
             return {'CANCELLED'}
-        if trust.none_is_trusted(cloud, trust.least_of(obj.patina)):
+        if trust.none_is_trusted(cloud, least):
             self.report({'WARNING'}, f"Patina: '{obj.name}': no point is trusted, so all of them are drawn, and none is selected")
             return {'CANCELLED'}
         selected = self._select(obj, found)
@@ -57,15 +58,8 @@ class PATINA_OT_select_untrusted(Operator):
             return self._select_cloud(obj, found)
         return self._select_edited(obj, found) if obj.mode == 'EDIT' else self._select_mesh(obj, found)
 
-    def _combined(self, old: np.ndarray, found: np.ndarray) -> np.ndarray:
-        return {'SET': found, 'ADD': old | found, 'SUB': old & ~found, 'AND': old & found}[self.how]
-
     def _select_linked(self, obj: Object, found: np.ndarray) -> int:
-        try:
-            old = edits.for_cloud(edits.packed_of(obj), len(found)) or edits.none(len(found))
-        except edits.Damaged as damaged:
-            self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}: begun anew")
-            old = edits.none(len(found))
+        old = points.edits_of(self, obj, len(found))
         new = replace(old, selected=points.combine(self.how, old.selected, edits.of_flags(found) & ~old.gone))
         points.write(obj, new)
         return new.totals["selected"]
@@ -75,7 +69,7 @@ class PATINA_OT_select_untrusted(Operator):
         old = np.ones(len(found), bool)
         if known and known.data_type == 'BOOLEAN' and len(known.data) == len(found):
             known.data.foreach_get("value", old)
-        new = self._combined(old, found)
+        new = points.combine(self.how, old, found)
         point_data.writable(obj.data, SELECTION, 'BOOLEAN').data.foreach_set("value", new)
         point_data.changed(obj.data)
         return int(new.sum())
@@ -85,7 +79,7 @@ class PATINA_OT_select_untrusted(Operator):
         old, hidden = np.empty(len(found), bool), np.empty(len(found), bool)
         vertices.foreach_get("select", old)
         vertices.foreach_get("hide", hidden)
-        new = self._combined(old, found) & ~hidden
+        new = points.combine(self.how, old, found) & ~hidden
         vertices.foreach_set("select", new)
         point_data.changed(obj.data)
         return int(new.sum())
@@ -93,15 +87,14 @@ class PATINA_OT_select_untrusted(Operator):
     def _select_edited(self, obj: Object, found: np.ndarray) -> int:
         edited = bmesh.from_edit_mesh(obj.data)
         edited.select_mode |= {'VERT'}
-        total = 0
-        for vertex, own in zip(edited.verts, found.tolist(), strict=True):
-            new = not vertex.hide and {'SET': own, 'ADD': vertex.select or own, 'SUB': vertex.select and not own,
-                                       'AND': vertex.select and own}[self.how]
-            vertex.select = new
-            total += new
+        old, hidden = (np.fromiter(values, bool, len(found)) for values in
+                       ((vertex.select for vertex in edited.verts), (vertex.hide for vertex in edited.verts)))
+        new = points.combine(self.how, old, found) & ~hidden
+        for vertex, own in zip(edited.verts, new.tolist(), strict=True):
+            vertex.select = own
         edited.select_flush_mode()
         bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
-        return total
+        return int(new.sum())
 
 
 def _why_not(obj: Object | None) -> str:
