@@ -91,6 +91,12 @@ def write(path: Path, data: bytes) -> None:
         file.write(data)
 
 
+def copy(source: Path, target: Path) -> None:
+    """OSError."""
+    with open(source, "rb") as found, writing(target) as file:
+        shutil.copyfileobj(found, file, 1 << 22)
+
+
 def remove_left(folder: Path, is_ours: Callable[[Path], bool]) -> int:
     """Deletes what was left beside files of a folder. is_ours: of the file that it was to become. How many are gone."""
     count = 0

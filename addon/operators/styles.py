@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import bpy
@@ -11,7 +10,7 @@ from bpy.props import EnumProperty, StringProperty
 from bpy.types import Context, Event, Object, Operator
 from bpy_extras.io_utils import ImportHelper
 
-from .. import native, point_data, styles, sync, thumbnails
+from .. import native, point_data, styles, sync, thumbnails, whole
 
 
 def _points(context: Context) -> Object | None:
@@ -117,9 +116,9 @@ class PATINA_OT_load_style(_StyleOperator, Operator, ImportHelper):
             for ending in (".json", ".png"):
                 given = source.with_suffix(ending)
                 if given.is_file() and given.resolve() != path.with_suffix(ending).resolve():
-                    shutil.copyfile(given, path.with_suffix(ending))
+                    whole.copy(given, path.with_suffix(ending))
         except OSError as error:
-            raise styles.StyleError(f"{error.filename}: {error.strerror}") from None
+            raise styles.StyleError(f"{path}: {error.strerror}") from None
         notices = styles.apply_to_scene(context.scene, path.stem)
         context.scene.patina.style.applied = path.stem
         if not path.with_suffix(".png").is_file() and _points(context):

@@ -11,7 +11,6 @@ import contextlib
 import hashlib
 import math
 import os
-import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -164,8 +163,7 @@ def share(source: Source) -> bool:
         target.mkdir(exist_ok=True)
         for path in names:
             if path.is_file() and not (target / path.name).is_file():
-                with open(path, "rb") as found, whole.writing(target / path.name) as file:
-                    shutil.copyfileobj(found, file, 1 << 22)
+                whole.copy(path, target / path.name)
         kept.remove_left(target)
     except OSError:
         return False
@@ -351,7 +349,9 @@ def _analyze(source: Source, bare: Source, found: Linked, made: bool, progress: 
     units = None if found.units == (1.0, 1.0) else list(found.units)
     notes = (found.origin, found.scanners, units, found.scans, found.told)
     if found.scans:  # at once: another Blender may let the cloud without go
-        found.cloud.scan_file = shutil.copyfile(found.cloud.scan_file, source.kept.with_suffix(SCAN_ENDING))
+        scan_file = source.kept.with_suffix(SCAN_ENDING)
+        whole.copy(found.cloud.scan_file, scan_file)
+        found.cloud.scan_file = scan_file
     stations = analysis.of_columns(found.scanners, _scan_of(found))
     try:
         yield from analyzing.on_disk(found.cloud, stations, bare.kept, source.kept, progress)

@@ -6,7 +6,6 @@ import json
 import os
 import random
 import shutil
-import sys
 import time
 from contextlib import contextmanager
 from unittest import mock
@@ -154,28 +153,40 @@ def test_cache_folder_goes():
             check(all(np.array_equal(picture[name], pixels) for name, pixels in wanted.items()), case)
 
 
-def test_styles_are_written_whole():
-    """A disk that is full while a style is written leaves the one before."""
-    path = styles.own_folder(create=True) / "whole.json"
-    styles.write(path, styles.Style("Before"))
-    good = path.read_bytes()
-    resource = sys.modules.get("resource") or __import__("resource") if os.name != "nt" else None
-    if resource is None:
+@contextmanager
+def full_disk():
+    """Within: files grow to 20 bytes and no further."""
+    if os.name == "nt":
         raise Skip("Windows limits no sizes of files")
+    import resource
     import signal
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, limits[1]))
     try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20, limits[1]))
-        try:
-            styles.write(path, styles.Style("Afterwards", "About " * 20))
-        except styles.StyleError as error:
-            check("whole.json" in str(error), str(error))
-        else:
-            check(False, "it was written")
+        yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    check(path.read_bytes() == good and not list(path.parent.glob("*.part")), f"{path.read_bytes()}")
+
+
+def test_styles_are_written_whole():
+    """A disk that is full while a style is saved, or loaded from elsewhere, leaves the one before."""
+    new_scene()
+    path, other = styles.own_folder(create=True) / "whole.json", SCRATCH / "elsewhere/whole.json"
+    other.parent.mkdir()
+    styles.write(path, styles.Style("Before"))
+    good = path.read_bytes()
+    after = styles.Style("Afterwards", "About " * 20)
+    styles.write(other, after)
+    for work in (lambda: styles.write(path, after), lambda: bpy.ops.patina.load_style(filepath=str(other))):
+        try:
+            with full_disk():
+                work()
+        except (styles.StyleError, RuntimeError) as error:
+            check(f"{path}: File too large" in str(error), str(error))
+        else:
+            check(False, "it was written")
+        check(path.read_bytes() == good and not list(path.parent.glob("*.part")), f"{path.read_bytes()}")
     path.unlink()
 
 
