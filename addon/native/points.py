@@ -24,6 +24,15 @@ class Mask(_Handle):
                          (cloud.count + 7) // 8)
 
 
+def _address(cloud: Cloud, scans: np.ndarray | None) -> int | None:
+    """Of the scan of each point. PatinaError unless it is a uint16 for each."""
+    if scans is None:
+        return None
+    if scans.dtype != np.uint16 or len(scans) != cloud.count or not scans.flags.c_contiguous:
+        raise PatinaError("scans are a uint16 for each point")
+    return scans.ctypes.data
+
+
 class Grade(_Handle):
     """A cloud's own colors, changed by scan. scans: (count,) uint16, or None: all are of the first. grades: gain, gamma, saturation
     and temperature of each. balance: (grades, 3) gains of red, green and blue before these, or None. keep_colors: points that were
@@ -33,23 +42,20 @@ class Grade(_Handle):
 
     def __init__(self, cloud: Cloud, scans: np.ndarray | None, grades: Sequence[Sequence[float]],
                  balance: np.ndarray | None = None, keep_colors: bool = False) -> None:
-        if scans is not None and (scans.dtype != np.uint16 or len(scans) != cloud.count or not scans.flags.c_contiguous):
-            raise PatinaError("scans are a uint16 for each point")
+        address = _address(cloud, scans)
         values = (abi.ScanGrade * len(grades))(*(abi.ScanGrade(*grade) for grade in grades))
         balance = np.ones((len(grades), 3), np.float32) if balance is None else np.ascontiguousarray(balance, np.float32)
         if balance.shape != (len(grades), 3):
             raise PatinaError("balance has three gains for each scan")
-        super().__init__(cloud._handle, None if scans is None else scans.ctypes.data, values, balance.ctypes.data, len(grades),
-                         int(keep_colors), blame=(cloud._handle,), create="patina_grade_create_balanced")
+        super().__init__(cloud._handle, address, values, balance.ctypes.data, len(grades), int(keep_colors),
+                         blame=(cloud._handle,), create="patina_grade_create_balanced")
 
 
 def gains(cloud: Cloud, scans: np.ndarray, count: int, progress: Progress | None = None) -> np.ndarray:
     """(count, 3) float32: what multiplies red, green and blue of each scan so that their light agrees where scans overlap. scans:
     (cloud.count,) uint16. PatinaError for a cloud without colors."""
-    if scans.dtype != np.uint16 or len(scans) != cloud.count or not scans.flags.c_contiguous:
-        raise PatinaError("scans are a uint16 for each point")
     found = np.ones((count, 3), np.float32)
-    check(library().patina_cloud_balance(cloud._handle, scans.ctypes.data, count, _handle_of(progress), found.ctypes.data), cloud._handle)
+    check(library().patina_cloud_balance(cloud._handle, _address(cloud, scans), count, _handle_of(progress), found.ctypes.data), cloud._handle)
     return found
 
 
@@ -60,10 +66,9 @@ class ScanSet(_Handle):
     _kind = "scans"
 
     def __init__(self, cloud: Cloud, of: np.ndarray | None, scans: Sequence[tuple[Sequence[float], float]]) -> None:
-        if of is not None and (of.dtype != np.uint16 or len(of) != cloud.count or not of.flags.c_contiguous):
-            raise PatinaError("scans are a uint16 for each point")
+        address = _address(cloud, of)
         values = (abi.Scan * len(scans))(*(abi.Scan((c_double * 3)(*direction), interval) for direction, interval in scans))
-        super().__init__(cloud._handle, None if of is None else of.ctypes.data, values, len(scans), blame=(cloud._handle,))
+        super().__init__(cloud._handle, address, values, len(scans), blame=(cloud._handle,))
 
 
 class Field(_Handle):
