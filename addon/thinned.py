@@ -28,7 +28,6 @@ FILL = 1.2  # of the local spacing, a radius: discs of a random choice leave few
 WIDEST = 3.0  # of the middle radius: strays are no balls
 TINT = 0.15  # of the color that marks selected objects: their dots are hidden
 LIGHT = np.float32((0.3, -0.4, 0.87))  # where from points without colors are lit
-INTENSITIES = ("intensity", "Intensity", "scalar_Intensity", "reflectance")  # whose grays stand in for colors
 
 _compiled = graphics.Shaders()
 _handler: object | None = None
@@ -55,7 +54,8 @@ _parts: dict[tuple[int, str, int], _Part | None] = {}  # by the object's place i
 _drawn: dict[tuple[int, int], list[_Drawn]] = {}  # by the view layer's place in memory and the budget; empty after a change
 
 
-def forget() -> None:
+@persistent
+def forget(*_: object) -> None:
     """After undo, or another file."""
     _parts.clear()
     _drawn.clear()
@@ -99,7 +99,7 @@ def _colors(obj: bpy.types.Object, count: int, index: np.ndarray, places: np.nda
             few = np.where(few <= 0.04045, few / 12.92, ((few + 0.055) / 1.055) ** 2.4)
         out[:, :3] = np.clip(np.nan_to_num(few), 0.0, 1.0)
         return out
-    found = next((values for name in INTENSITIES if (values := attributes.scalars(obj.data, count, name)) is not None), None)
+    found = attributes.scalars(obj.data, count, attributes.intensity_name(obj.data))
     normals = attributes.normals(obj.data, count, "") if found is None else None
     if found is not None:
         gray = _stretched(found[index, 0])
@@ -242,13 +242,8 @@ def _changed(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         del _parts[key]
 
 
-@persistent
-def _forget(*_) -> None:
-    forget()
-
-
 _HANDLERS: tuple[tuple[str, Callable[..., None]], ...] = (
-    ("depsgraph_update_post", _changed), ("frame_change_post", _changed), ("undo_post", _forget), ("redo_post", _forget), ("load_pre", _forget))
+    ("depsgraph_update_post", _changed), ("frame_change_post", _changed), ("undo_post", forget), ("redo_post", forget), ("load_pre", forget))
 
 
 def register() -> None:

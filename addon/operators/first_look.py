@@ -14,7 +14,6 @@ from ..sync import attributes, linked
 from . import colors, view_transform
 
 PLASTER = "plaster"  # the style of points that have positions alone
-INTENSITY = ("intensity", "reflectance", "amplitude", "grey", "gray", "scalar_intensity")  # names in lower case, the first found counts
 SHARE = 0.01  # of the points that the stretch of intensity leaves out at either end
 
 
@@ -38,7 +37,7 @@ def data_of(obj: Object, frame: int) -> Data:
         rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
         if rgb is not None and attributes.colored(rgb).any():
             return Data.COLORS
-        if _intensity(obj):
+        if attributes.intensity_name(obj.data):
             return Data.INTENSITY
         classes = attributes.classes(data, count, obj.patina.colors.class_attribute) if count else None
         return Data.CLASSES if classes is not None and classes.any() else Data.POSITIONS
@@ -73,14 +72,8 @@ def _data(obj: Object, frame: int) -> Data:
         return Data.COLORS  # the viewport reports the file
 
 
-def _intensity(obj: Object) -> str:
-    """The attribute that holds how bright the scanner saw the points; "": none."""
-    names = {attribute.name.lower(): attribute.name for attribute in obj.data.attributes if attribute.data_type in {'FLOAT', 'INT', 'INT8'}}
-    return next((names[name] for name in INTENSITY if name in names), "")
-
-
 def _show_intensity(obj: Object) -> str:
-    name = _intensity(obj)
+    name = attributes.intensity_name(obj.data)
     _show_scalar(obj, name, 'GREY')
     group = obj.patina.colors
     for share in (0.0, SHARE):

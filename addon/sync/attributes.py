@@ -13,6 +13,7 @@ import numpy as np
 # Names looked for, in this order, when the artist names none.
 NORMAL_NAMES = ("normal", "Normal", "normals", "Normals", "nor", "N")
 CLASS_NAMES = ("class", "classification", "Classification", "scalar_Classification", "scalar_classification")
+INTENSITY_NAMES = ("intensity", "reflectance", "amplitude", "grey", "gray", "scalar_intensity")  # whatever their case
 COLOR_NAMES = ("Col", "Color", "color", "Cd", "rgb", "RGB")
 
 BLOCK = 1 << 19  # points between two looks at what the artist wants
@@ -154,6 +155,12 @@ def scalars(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     """(count, 1) float32 of the named attribute."""
     attribute = _find(data, name, _NUMBERS) if name else None
     return _values(attribute, count) if attribute else None
+
+
+def intensity_name(data: bpy.types.ID) -> str:
+    """The attribute that holds how bright the scanner saw the points; "": none."""
+    names = {attribute.name.lower(): attribute.name for attribute in data.attributes if attribute.data_type in {'FLOAT', 'INT', 'INT8'}}
+    return next((names[name] for name in INTENSITY_NAMES if name in names), "")
 
 
 def numbers(data: bpy.types.ID, count: int, name: str, width: int) -> np.ndarray | None:
