@@ -15,13 +15,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 from check_linked import dense
-from check_view_edits import override
 from harness import SCRATCH, check, render
 from mathutils import Matrix, Quaternion
 from patina import point_data, viewport
 from patina.sync import clouds
 from session_rounds import operate, undo
-from window import area, setup, shown, view
+from window import area, override, setup, shown, view
 
 POINTS = 20_000
 ACTIONS_A_ROUND = 6

@@ -7,15 +7,10 @@ import numpy as np
 from harness import check, sphere
 from patina import importers, point_data
 from patina.importers import PointFile
-from window import area, screenshot, settled, setup, window_region
+from window import area, override, screenshot, settled, setup, window_region
 
 COUNT = 20_000
 KINDS = (False, True) if point_data.HAS_CLOUDS else (False,)
-
-
-def override():
-    window = bpy.context.window_manager.windows[0]
-    return bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region())
 
 
 def given(cloud):

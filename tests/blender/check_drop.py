@@ -2,22 +2,16 @@
 """Files that are dropped on a view, Blender 4.1 and later. What the window system delivers ends in wm.drop_import_file, which is called here
 as Blender's drop box does: it looks for a file handler that takes the ending and the place. See test_window.py for what a yield means."""
 
-import time
-
 import bpy
 import numpy as np
+from check_import import write_ply
 from harness import SCRATCH, Skip, check, new_scene, sphere
 from patina import point_data
 from patina.operators import import_points
-from window import area, whole_window
+from window import area, pause, whole_window
 
 COUNT = 500
 KIND = 'POINTCLOUD' if point_data.HAS_CLOUDS else 'MESH'
-
-
-def pause(seconds=1.0):
-    until, rounds = time.perf_counter() + seconds, iter(range(10))
-    return lambda: next(rounds, None) is None and time.perf_counter() > until
 
 
 def press(*keys):
@@ -25,7 +19,7 @@ def press(*keys):
     for key in keys:
         for value in ('PRESS', 'RELEASE'):
             window.event_simulate(key, value, x=window.width // 2, y=window.height // 2)
-        yield pause()
+        yield pause(1.0, 10)
 
 
 def drop(*paths, place='VIEW_3D'):
@@ -44,8 +38,7 @@ def files():
     xyz, pts, ply, wrong = (folder / name for name in ("one.xyz", "two.pts", "three.ply", "wrong.pcd"))
     np.savetxt(xyz, rows, fmt="%.5f %.5f %.5f %d %d %d")
     np.savetxt(pts, rows, fmt="%.5f %.5f %.5f %d %d %d", header=str(COUNT), comments="")
-    ply.write_bytes(f"ply\nformat binary_little_endian 1.0\nelement vertex {COUNT}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
-                    .encode() + positions.astype("<f4").tobytes())
+    write_ply(str(ply), [(axis, "f4", positions[:, i]) for i, axis in enumerate("xyz")])
     wrong.write_text("no points\n")
     return xyz, pts, ply, wrong
 
@@ -68,7 +61,7 @@ def test_dropped_files_are_imported():
     yield lambda: set(there()) == {"one", "one.001", "two"}
     check(bpy.context.view_layer.objects.active in there().values(), "what was dropped is active")
     check(drop(ply) == {'INTERFACE'}, "Blender has an importer of PLY too")
-    yield pause(2.0)
+    yield pause(2.0, 10)
     whole_window("dropped")
     yield from press('P')  # the letter that the menu underlines in Import Points
     yield lambda: "three" in bpy.data.objects

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from check_import import import_ply
 from check_linked import dense
-from harness import REPOSITORY, SCRATCH, Skip, add_points, check, new_scene, render
+from harness import REPOSITORY, SCRATCH, Skip, add_points, check, forget_files, new_scene, render
 from patina import importers
 from patina.farm import task
 from patina.sync import clouds, linked
@@ -28,11 +28,11 @@ def pixels_of(path):
 
 
 def clean_scene():
-    """Without the materials and images of other tests: a job names their files."""
+    """Without the materials, images and volumes of other tests: a job names their files."""
     scene = new_scene()
-    for collection in (bpy.data.materials, bpy.data.images):
-        for item in list(collection):
-            collection.remove(item)
+    for item in list(bpy.data.materials):
+        bpy.data.materials.remove(item)
+    forget_files()
     return scene
 
 

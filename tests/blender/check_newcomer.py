@@ -4,14 +4,13 @@ yield means; PATINA_SCREENSHOTS names a folder that keeps the pictures."""
 
 import os
 import subprocess
-import time
 from pathlib import Path
 
 import bpy
 import numpy as np
 from harness import REPOSITORY, SCRATCH, Skip, check, saved
 from patina.operators import set_up
-from window import area, invoke_import, screenshot, shown, whole_window, window_region
+from window import area, invoke_import, pause, screenshot, shown, whole_window, window_region
 
 POINTS = int(os.environ.get("PATINA_NEWCOMER_POINTS", "20000"))
 
@@ -96,24 +95,18 @@ class Hand:
     def __init__(self, before):
         self.clicks = before
 
-    @staticmethod
-    def pause(seconds, rounds=5):
-        """So long, and so many rounds of Blender's own: on a slow machine one may take seconds."""
-        until, left = time.perf_counter() + seconds, iter(range(rounds))
-        return lambda: next(left, None) is None and time.perf_counter() > until
-
     def click(self, place):
         """In the newest window."""
         window = bpy.context.window_manager.windows[-1]
         x, y = place[0], window.height - place[1]
         for step in (6, 3, 0):
             window.event_simulate('MOUSEMOVE', 'NOTHING', x=x - step, y=y)
-            yield self.pause(0.2)
+            yield pause(0.2)
         for value in ('PRESS', 'RELEASE'):
             window.event_simulate('LEFTMOUSE', value, x=x, y=y)
-            yield self.pause(0.1)
+            yield pause(0.1)
         self.clicks += 1
-        yield self.pause(0.5)
+        yield pause(0.5)
 
     def clicks_until(self, done, *places):
         """Again where Blender missed one while it drew, as it does on a slow machine; they count once."""
@@ -121,7 +114,7 @@ class Hand:
             before = self.clicks
             for place in places:
                 yield from self.click(place)
-            enough = self.pause(10.0)
+            enough = pause(10.0)
             yield lambda enough=enough: done() or enough()
             if done():
                 return
@@ -129,7 +122,7 @@ class Hand:
             window = bpy.context.window_manager.windows[0]
             for value in ('PRESS', 'RELEASE'):
                 window.event_simulate('ESC', value, x=20, y=20)
-            yield self.pause(1.0)
+            yield pause(1.0)
         check(False, f"clicks at {places} had no effect")
 
 
@@ -149,11 +142,11 @@ def test_newcomers_clicks():
     browser = windows[1].screen.areas[0].spaces[0]
     yield lambda: browser.params is not None
     browser.params.directory = str(path.parent).encode()  # where the newcomer keeps scans
-    yield hand.pause(2.0)
+    yield pause(2.0)
     yield from hand.click(DIALOG_FILE)
     yield from hand.click(DIALOG_IMPORT)
     yield lambda: "relief" in bpy.data.objects and len(windows) == 1
-    yield hand.pause(1.0)
+    yield pause(1.0)
     whole_window("clicks_1_imported")
     # Set Up for Points is offered under the hand
     yield from hand.clicks_until(lambda: scene.render.engine == 'PATINA', MENU_POINTS)

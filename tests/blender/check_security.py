@@ -62,7 +62,7 @@ def check_events(events, processes=()):
             check(MARK.name not in str(arguments[0]), f"compiled: {arguments}")
         if event == "subprocess.Popen":
             words = [os.fspath(word) for word in arguments[1]]
-            check(any(word.endswith(processes) for word in words) if processes else False, f"started: {words}")
+            check(any(word.endswith(processes) for word in words), f"started: {words}")
         written = None
         if event == "open" and isinstance(arguments[0], (str, bytes)):
             written = arguments[0] if isinstance(arguments[2], int) and arguments[2] & WRITES else None

@@ -10,16 +10,12 @@ import screen
 from harness import add_points, check, sphere
 from patina import importers, point_data, preferences, thinned
 from patina.importers import PointFile
-from window import area, keep, setup, window_region
+from window import area, keep, pause, setup, window_region
 
 COLOR = (210, 60, 40, 255)
+PAUSE = 0.6  # seconds
 NONE = 3000  # pixels: of the red axis, which is as red
 KINDS = (False, True) if point_data.HAS_CLOUDS else (False,)
-
-
-def pause(seconds=0.6):
-    until, rounds = time.perf_counter() + seconds, iter(range(5))
-    return lambda: next(rounds, None) is None and time.perf_counter() > until
 
 
 def seen(name="", color=COLOR):
@@ -55,20 +51,20 @@ def test_thinned_colors_in_solid():
             for selected in (False, True):
                 area().spaces[0].shading.type = kind
                 obj.select_set(selected)
-                yield pause()
+                yield pause(PAUSE)
                 counts[kind, selected] = seen(f"{kind} {obj.type} {selected}")
         check(min(counts.values()) > 60_000, f"{obj.type}: pixels in the cloud's color: {counts}")
         parts = [part for part in thinned._parts.values() if part]
         check(len(parts) == 1 and len(parts[0].places) == preferences.PREVIEW_POINTS, f"{[len(part.places) for part in parts]} points are shown")
         obj.hide_set(True)
-        yield pause()
+        yield pause(PAUSE)
         check(seen("hidden") < NONE, f"{seen()} pixels of a hidden {obj.type}")
         obj.hide_set(False)
         colors = np.tile(np.float32((0.1, 0.8, 0.2, 1.0)), 120_000)
         obj.data.attributes["Col"].data.foreach_set("color_srgb", colors)
         point_data.changed(obj.data)
         obj.location.x = 1.0
-        yield pause()
+        yield pause(PAUSE)
         check(seen("painted", (26, 204, 51)) > 60_000, f"{obj.type}: {seen('', (26, 204, 51))} pixels after its colors changed")
 
 
@@ -78,16 +74,16 @@ def test_thinned_points_are_hidden_by_what_is_nearer():
         view_in('SOLID')
         obj = given(cloud)
         obj.select_set(False)
-        yield pause()
+        yield pause(PAUSE)
         whole = seen("whole")
         bpy.ops.mesh.primitive_cube_add(size=2.0, location=(0.0, 0.0, 2.2))
         cube = bpy.context.object
         cube.select_set(False)
-        yield pause()
+        yield pause(PAUSE)
         behind = seen("behind")
         check(behind < 0.7 * whole, f"{obj.type}: {behind} of {whole} pixels behind a cube")
         cube.location.z = -4.0
-        yield pause()
+        yield pause(PAUSE)
         check(seen("before") > 0.97 * whole, f"{obj.type}: {seen()} of {whole} pixels before a cube")
         bpy.data.objects.remove(cube)
         collection = bpy.data.collections.new("scans")
@@ -96,11 +92,11 @@ def test_thinned_points_are_hidden_by_what_is_nearer():
         instance = bpy.data.objects.new("instance", None)
         instance.instance_type, instance.instance_collection = 'COLLECTION', collection
         bpy.context.scene.collection.objects.link(instance)
-        yield pause()
+        yield pause(PAUSE)
         check(seen("instance") > 0.97 * whole, f"{obj.type}: {seen()} of {whole} pixels of an instance")
         before, preferences.PREVIEW_POINTS = preferences.PREVIEW_POINTS, 0
         area().tag_redraw()
-        yield pause()
+        yield pause(PAUSE)
         none, preferences.PREVIEW_POINTS = seen("none"), before
         check(none < NONE, f"{obj.type}: {none} pixels without a budget")
 
@@ -115,7 +111,7 @@ def test_thinned_points_without_colors():
     for cloud in KINDS:
         empty = bpy.data.pointclouds.new("empty") if cloud else bpy.data.meshes.new("empty")
         bpy.context.scene.collection.objects.link(bpy.data.objects.new("empty", empty))
-    yield pause()
+    yield pause(PAUSE)
     bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
     picture, region = screen.settled_pixels().astype(np.int16), window_region()
     picture = picture[region.y:region.y + region.height, region.x:region.x + region.width]

@@ -11,15 +11,10 @@ from check_import import import_ply
 from harness import Skip, check
 from patina import point_data
 from patina.sync import edits
-from window import area, newer, screenshot, settled, setup, shown, window_region
+from window import area, newer, override, screenshot, settled, setup, shown, window_region
 
 GREEN = (40, 200, 60)
 MARGIN = 160  # pixels of the view on all sides of its middle, that hold the wall and none of Blender's own
-
-
-def override():
-    window = bpy.context.window_manager.windows[0]
-    return bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region())
 
 
 def begin(name="view_wall.ply"):

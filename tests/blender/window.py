@@ -2,6 +2,7 @@
 """What the tests in a window share: the 3D view in Rendered mode, what it shows, and its pixels."""
 
 import os
+import time
 
 import bpy
 import numpy as np
@@ -22,6 +23,11 @@ def window_region():
     return next(region for region in area().regions if region.type == 'WINDOW')
 
 
+def override():
+    window = bpy.context.window_manager.windows[0]
+    return bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region())
+
+
 def view():
     return area().spaces[0].region_3d
 
@@ -39,6 +45,12 @@ def settled(points):
     found = shown()
     return found is not None and not ANALYSES.busy() and found.shown.stats["points"] == points and \
         found.shown.wish.view == viewport.sync.viewport_view(window_region(), area().spaces[0], view(), bpy.context.scene)
+
+
+def pause(seconds, rounds=5):
+    """Waits so long, and so many rounds of Blender's own: on a slow machine one may take seconds."""
+    until, left = time.perf_counter() + seconds, iter(range(rounds))
+    return lambda: next(left, None) is None and time.perf_counter() > until
 
 
 def newer(than):

@@ -54,9 +54,8 @@ def scan(name="scan.ply", count=8000):
 # What the command line writes: the arguments, and the name of what they write.
 def commands():
     scan()
-    for name, options in (("good.cloud", ()),):
-        if not (SCRATCH / name).exists():
-            run("convert", "scan.ply", name, *options)
+    if not (SCRATCH / "good.cloud").exists():
+        run("convert", "scan.ply", "good.cloud")
     return {"cloud": (("convert", "scan.ply", "out.cloud"), "out.cloud"),
             "packed": (("convert", "scan.ply", "small.cloud", "--pack", "on", "--order", "drop"), "small.cloud"),
             "bare": (("convert", "scan.ply", "bare.cloud", "--analysis", "off"), "bare.cloud"),
