@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Patina: image-space rendering of point clouds. This header is the manual.
 //
-// A program describes a scene (clouds, lights, a camera, settings), renders it into a frame on a
-// device, and reads passes (pictures of one float kind) out of the frame:
+// A program describes a scene (clouds, lights, a camera, settings), renders it into a frame on a device, and reads passes (images of one
+// kind of floats) out of the frame:
 //
 //     patina_device *device; patina_device_create(NULL, &device);
 //     patina_cloud *cloud;   patina_cloud_load("statue.ply", NULL, &cloud);
@@ -17,26 +17,26 @@
 //
 // Conventions
 //   Handles are opaque; `*_create`, `*_open` and `*_load` give ownership, `*_destroy` takes it back and accepts NULL.
-//   Functions return PATINA_OK (0) or a negative code; the sentence that says what and where is at the
-//   handle (patina_message), or at the thread (patina_message(NULL)) when no handle came to be.
-//   A descriptor's first field is struct_size = sizeof of it; every other field's zero means "default".
-//   Passing NULL for a descriptor means all defaults. Inputs are copied before the call returns.
+//   Functions return PATINA_OK (0) or a negative code; the sentence that says what and where is at the handle (patina_message), or at the
+//   thread (patina_message(NULL)) when no handle came to be.
+//   A descriptor's first field is struct_size = sizeof of it; every other field's zero means "default". Passing NULL for a descriptor means
+//   all defaults. Inputs are copied before the call returns.
 //   Where a descriptor has `exact`, 0 takes a colour of three zeros, and Phong factors of three zeros, for "default"; with 1 they are
 //   black, and none. PATINA_*_INIT begins such a descriptor: exact, with every default spelled out.
-//   Programs and libraries may be of different age. A descriptor that is shorter than the library's is taken as if the rest were
-//   zero; of a longer one what the library does not know must be zero, else PATINA_ERROR_UNSUPPORTED. Structures that are handed
-//   out are filled as far as they reach; what the library does not know becomes 0. struct_size must be a multiple of 8 from 16 to 65536,
-//   else PATINA_ERROR_ARGUMENT. New fields stand at the end, and never in what was padding; fields neither move nor go.
-//   Pictures are row-major float32, row 0 at the BOTTOM (as Blender's and OpenGL's), colour scene-linear and
-//   premultiplied. Matrices are float64, row-major, column vectors: world = M * object.
-//   View space is right-handed and looks down -z. "z" in passes is linear distance: to the camera plane in
-//   perspective, from the near plane in orthographic views; +inf where nothing is.
+//   Programs and libraries may be of different age. A descriptor that is shorter than the library's is taken as if the rest were zero; of a
+//   longer one what the library does not know must be zero, else PATINA_ERROR_UNSUPPORTED. Structures that are handed out are filled as far
+//   as they reach; what the library does not know becomes 0. struct_size must be a multiple of 8 from 16 to 65536, else
+//   PATINA_ERROR_ARGUMENT. New fields stand at the end, and never in what was padding; fields neither move nor go.
+//   Pictures are row-major float32, row 0 at the BOTTOM (as Blender's and OpenGL's), colour scene-linear and premultiplied. Matrices are
+//   float64, row-major, column vectors: world = M * object.
+//   View space is right-handed and looks down -z. "z" in passes is linear distance: to the camera plane in perspective, from the near plane
+//   in orthographic views; +inf where nothing is.
 //
-// Threads: any handle may be used from any thread, one call at a time per handle; the exceptions, which may be
-// called at any time from any thread, are patina_frame_cancel, patina_frame_progress, patina_progress_cancel,
-// patina_progress_value, patina_task_done, patina_message and patina_log_next. A task counts as a call of the handles
-// that it was given, from its start until it is done. Different handles are independent. A cloud may be
-// in many scenes and frames at once: it is immutable after creation.
+// Threads: any handle may be used from any thread, one call at a time per handle; the exceptions, which may be called at any time from any
+// thread, are patina_frame_cancel, patina_frame_progress, patina_progress_cancel, patina_progress_value, patina_task_done, patina_message
+// and patina_log_next. A task counts as a call of the handles that it was given, from its start until it is done. Different handles are
+// independent. A cloud may be in many scenes and frames at once. No frame may be rendering it while a call changes it
+// (patina_cloud_set_colors, _set_scalars, _analyse, patina_task_apply) or destroys it.
 #ifndef PATINA_H
 #define PATINA_H
 
@@ -122,10 +122,10 @@ typedef struct patina_device_desc {
     uint32_t threads;    // CPU worker threads; 0 = one per core available to the process
     uint32_t batch;      // scheduling batch (items a worker takes at once); 0 = automatic. Never changes a picture.
     uint64_t memory_cap; // bytes of planes that a frame may hold (about 100 a pixel, 150 in transparent scenes); 0 = no limit
-    // Bytes that a picture holds at a time of clouds that patina_cloud_open maps. More is read in rounds, and what was read is given
-    // back; no picture changes by it. 0 = a third of the memory that is free when a picture begins; UINT64_MAX = no limit. OpenGL
-    // copies clouds whole where they take no more than a cap that is given and the graphics memory has room; else it copies ranges of their
-    // points, as often as it needs them. PATINA_ERROR_MEMORY: a cap that has no room for two of them, some 300 KB.
+    // Bytes that a picture holds at a time of clouds that patina_cloud_open maps. More is read in rounds and given back; no picture changes
+    // by it. 0 = a third of the memory that is free when a picture begins; UINT64_MAX = no limit. OpenGL copies clouds whole if a given cap
+    // and the graphics memory have room for them, else ranges of their points, as often as it needs them. PATINA_ERROR_MEMORY: a cap without
+    // room for two ranges, some 300 KB.
     uint64_t mapped_cap;
 } patina_device_desc;
 
@@ -195,8 +195,7 @@ typedef struct patina_cloud_info {
     uint64_t invalid_positions, invalid_normals, invalid_colors; // NaN/Inf (normals: or zero); the last two of drawn points
     uint32_t has_normals, has_colors, has_opacities;
     double origin[3];
-    double layer_distance; // automatic d~: what d_min = 0 stands for at the median spacing, object units. Each chunk
-                           // takes its own spacing's
+    double layer_distance; // what d_min = 0 stands for at the median spacing, object units. Each chunk takes its own spacing's
     uint32_t has_radii;
     float radius_most; // of the points' own radii
     uint32_t has_scalars, has_classes;
@@ -226,8 +225,8 @@ PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
 PATINA_API int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color);
 // The same for scalars.
 PATINA_API int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar);
-// The scalars that `share` of the points lie below and above, 0 <= share < 0.5; 0: the least and the greatest. What is not
-// finite does not count. PATINA_ERROR_EMPTY without a finite scalar.
+// The scalars that `share` of the points lie below and above, 0 <= share < 0.5; 0: the least and the greatest finite ones.
+// PATINA_ERROR_EMPTY without a finite scalar.
 PATINA_API int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2]);
 // The box of a cloud without strays: points outside of the box of 90 percent of them that have hardly another near. Of a
 // cloud without any its own box; an empty cloud has min > max.
@@ -256,32 +255,29 @@ typedef struct patina_analysis_desc {
     size_t struct_size;
     uint32_t neighbours;    // 3..64; 0 = 16, and 48 where 16 leave doubts
     uint32_t threads;       // 0 = one per core
-    uint32_t keep_normals;  // 1 = normals that the cloud has stay, and only missing ones are estimated. 0 = all are
-                            // estimated, on the side of those that it has
+    uint32_t keep_normals;  // 1 = only missing normals are estimated. 0 = all are, on the side of those that the cloud has
     uint32_t station_count; // places of the scanner, in object units: estimated normals face the one that ...
     const double *stations; // 3 each
     patina_array station;   // ... 1 x UINT8/UINT16 names for each point, count elements; without it, the nearest. Optional
-    uint32_t free_space;    // 1 = points that a station, not their own, saw through are marked: its samples around the
-                            // direction to the point lie farther. Needs stations and station. 4 bytes meanwhile for each of
-                            // a station's directions, 128 MiB at most; what all stations saw stays
-                            // with the cloud, 64 MiB at most
-    patina_array row,
-        column;    // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell footprints and free
-                   // space how far apart the directions are. Optional: else found from how dense they are
+    // 1 = points that a station, not their own, saw through are marked: its samples around the direction to the point lie farther. Needs
+    // stations and station. Meanwhile 4 bytes for each direction of a station, 128 MiB at most; what all saw, 64 MiB at most, stays.
+    uint32_t free_space;
+    // Of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements: footprints and free space take from them how far apart
+    // directions are. Optional: else found from how dense directions are.
+    patina_array row, column;
     uint32_t grid; // 1 = neighbours in its scan's grid, and not those in space alone, tell a point's normal and footprint, and
                    // that a surface ends where depth steps behind it or nothing came back. Needs row and column, and
                    // for each scan where it was taken from: stations, or directions. 16 bytes a point and 4 a
                    // cell meanwhile. Points that lie in no cell, or in one with another point, are as without it
-    patina_array scan; // with grid: in whose each point lies, 1 x UINT8/UINT16. Optional: `station` else; without both all
-                       // lie in one
+    patina_array scan;        // with grid: each point's scan, 1 x UINT8/UINT16. Optional: else as station says, or one for all
     uint32_t direction_count; // with grid, of scans whose beams are parallel, and whose place nobody knows: ...
     const double *directions; // ... in which each looked, 3 each, any length; 0 0 0: it has a station
-    float *
-        trust_features; // NULL, or PATINA_TRUST_FEATURES numbers of each point, `count` times, in the given order: what its trust
-                        // is found from, to train with. Points that are not drawn read 0. For patina_cloud_analyse
-    uint32_t
-        keep_colors; // 1 = points without a color stay black. 0 = points that are exactly black, or were not finite, among colored
-                     // ones get the mean of their trusted colored neighbors (SPEC 11)
+    // NULL, or PATINA_TRUST_FEATURES numbers of each of `count` points in the given order, to train trust with; 0 of points that are not
+    // drawn. For patina_cloud_analyse.
+    float *trust_features;
+    // 1 = points without a color stay black. 0 = points among colored ones that are exactly black, or whose color was not finite, get the
+    // mean of their trusted colored neighbors (SPEC 11).
+    uint32_t keep_colors;
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
@@ -289,9 +285,8 @@ typedef struct patina_analysis_desc {
 // NULL. On failure or cancel the cloud stays as it was. Any number of threads gives the same bytes.
 PATINA_API int patina_cloud_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress);
 
-// Arrays of the caller's, patina_cloud_info.count elements in the given order; NULL = not wanted. Points that are not drawn
-// read 0. Those of the first group are as the analysis left them, in steps of what 8 bytes hold; without one, 0 but for what
-// the cloud was given.
+// Arrays of the caller's, patina_cloud_info.count elements in the given order; NULL = not wanted. Points that are not drawn read 0. Those
+// of the first group are as the analysis left them, in steps of what 8 bytes hold; without one, 0 but for what the cloud was given.
 typedef struct patina_neighbourhoods {
     size_t struct_size;
     float *normal;         // 3 each; 0 = none
@@ -377,21 +372,18 @@ enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2
 
 typedef struct patina_cloud_style {
     size_t struct_size;
-    double world_from_object[16];     // all zero = identity. Mirrored, non-uniform, singular: all allowed
-    uint32_t lighting;                // patina_lighting
-    uint32_t cull_back;               // 1 = points that face away are not drawn; ignored without normals and where the cloud
-                                      // is transparent
-    float d_min;                      // the paper's d~, world units: least distance of two layers; 0 = automatic
-    float color[3];                   // linear; colour of points without one. All zero = (0.8, 0.8, 0.8), unless exact
+    double world_from_object[16]; // all zero = identity. Mirrored, non-uniform, singular: all allowed
+    uint32_t lighting;            // patina_lighting
+    uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals, and of transparent clouds
+    float d_min;                  // the paper's d~, world units: least distance of two layers; 0 = automatic
+    float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8), unless exact
     float ambient, diffuse, specular; // Phong factors; all three zero = 1, 1, 0
     uint32_t shininess;               // Phong exponent; 0 = 32
-    float transparency;               // share of light that a surface lets through, 0..1; 0 = opaque, 1 = not drawn at all.
-                                      // Opacity is 1 - transparency, times the point's own. Paper [D 5]. Its shadow
-                                      // is as much lighter: by this number once, however many of its surfaces stand
-                                      // in the way; where points have opacities of their own, by up to 8 of them
-    uint32_t shadow_off;              // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
-    float radius;               // of every point's disc, world units, for PATINA_SURFACE_SPLATS; 0 = the point's own, else
-                                // 1.75 times the local spacing
+    // Share of light that a surface lets through, 0..1; 0 = opaque, 1 = not drawn. Opacity is 1 - transparency, times the point's own
+    // [D 5]. Its shadow is lighter by it once, however many of its surfaces stand in the way; with opacities of points, by up to 8 of them.
+    float transparency;
+    uint32_t shadow_off; // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
+    float radius; // of every point's disc, world units, for SURFACE_SPLATS; 0 = the point's own, else 1.75 local spacings
     uint32_t color_source;      // patina_color_source
     const float *ramp;          // ramp_count x 3, linear; copied. Evenly spaced over the range, straight between, even
                                 // beyond. NULL = from black to white. A scalar that is NaN takes `color`
@@ -408,9 +400,9 @@ typedef struct patina_cloud_style {
     float least_trust;     // points of less trust are not drawn and cast no shadow; 0 = the cloud's own default, negative = all
                            // are drawn. Where no point has as much, all are drawn, too: patina_frame_stats.none_trusted
     float largest_gap;     // world units; no disc is wider, whatever its radius; 0 = as wide as it is
-    const patina_mask
-        *mask; // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
-               // the scene or the next patina_scene_clear, as the cloud must; the grade too
+    // Of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. Like the cloud, mask and grade must outlive the
+    // scene or the next patina_scene_clear.
+    const patina_mask *mask;
     const patina_grade *grade; // of this cloud: its colours in place of the cloud's own. NULL = none
     uint32_t exact;            // 1 = black is black, and three Phong factors of 0 are none
     uint32_t was_padding;      // says nothing
@@ -497,9 +489,9 @@ typedef struct patina_camera {
 enum patina_quality { PATINA_QUALITY_REFINED = 0, PATINA_QUALITY_PAPER = 1 }; // filled depth: tangent plane | source's
 enum patina_fill { PATINA_FILL_CLOSED = 0, PATINA_FILL_PAPER = 1, PATINA_FILL_OFF = 2 };
 // How points become a surface. AUTO: of clouds that were analysed, points whose footprint is wider than a pixel or two are discs,
-// as wide as it, the others are filled; where fill is not CLOSED, and of clouds that were not, all are filled. FILL: image-space filling, as quality and fill say. SPLATS: each point is a flat disc across its
-// normal (without one: across the view), discs within a layer distance of the nearest one are blended; quality, fill, their
-// iterations and error_target say nothing then. Light maps of shadows are filled either way.
+// as wide as it, the others are filled; where fill is not CLOSED, and of clouds that were not, all are filled. FILL: image-space filling,
+// as quality and fill say. SPLATS: each point is a flat disc across its normal (without one: across the view), discs within a layer
+// distance of the nearest one are blended; quality, fill, their iterations and error_target say nothing then. Light maps are filled always.
 // RANGES: points are merged in a coarser picture, the image buffer, and its pixels joined into faces, whose normals follow from them, as
 // the style's `range_` fields say; no normals, no analysis and no filling are needed, and scans that do not quite fit are one surface.
 // For clouds whose style has surface RANGES alone, too.
@@ -528,10 +520,9 @@ typedef struct patina_settings {
                                // layer is empty or less than 1/512 of the light comes through. Paper [D 4, 5]
     uint32_t layer_passes;     // bits 1 << PATINA_PASS_COMBINED, _DEPTH, _NORMAL: kept of every layer for
                                // patina_frame_read_layer; layers are then peeled behind opaque surfaces too. 0 = none
-    float error_target;        // > 0: quality and fill are chosen, the cheapest whose expected colour error is not above this;
-                               // where none is, the best. 0 = quality and fill as they are set
-    uint32_t strata;           // 1..6: draw only every 32nd, 16th, .. 1st point of each chunk, rounded up to 16 points:
-                               // a quick picture while navigating, filling closes the gaps. 0 = all
+    float error_target; // > 0: chooses the cheapest quality and fill with this expected colour error, or the best; 0 = as set
+    uint32_t strata;    // 1..6: draw only every 32nd, 16th, .. 1st point of each chunk, rounded up to 16 points:
+                        // a quick picture while navigating, filling closes the gaps. 0 = all
     // Shadow textures [D 6], of lights that cast: for every point and light the share of the light that arrives.
     uint32_t shadow_samples;     // of a light's area, 1..4096; 0 = 1: its middle; with shadow_error at most so many, 0 = 256
     uint32_t shadow_resolution;  // most texels on a side of a light's map; 0 = 4096. Fewer where the points lie wider
@@ -540,20 +531,19 @@ typedef struct patina_settings {
     uint32_t shadow_progressive; // 1 = one sample after a change, and every further render of the frame doubles them up to
                                  // shadow_samples (stats: shadow_pending); not with shadow_lazy. Where whole textures would
                                  // take more than a gigabyte, of points that the picture shows alone, for each view anew
-    float shadow_error;          // > 0: a light's samples double until their expected error is at most this share of its
-                                 // light. Expected from what the last doubling changed, root mean square over the points
-                                 // in the penumbra; borders, a spacing wide, are off beyond that. Whole textures are made,
-                                 // also with shadow_lazy. 0 = shadow_samples as set
-    uint32_t own_background;     // 1 = background lies behind the points, and world_color only lights them
-    float background[3];         // linear, with own_background; not where the film is transparent
-    uint32_t surface;            // patina_surface
-    uint32_t shadow_uncut;       // 1 = what clips cut away still casts shadows
-    uint32_t pixel_samples; // of a picture at rest, 1..4096; 0 = 1, with pixel_noise at most so many, 0 = 256: the colour is
-                            // the mean of about so many samples a pixel, of finer pixels where that is truer, shifted
-                            // pictures for the rest, each smoothed and anti-aliased as is set (truest with antialias on). Other
-                            // passes and keys are those of one sample. More than one: whole shadow textures, in spite of
-                            // shadow_lazy, and of shadow_progressive without pixel_progressive
-    uint32_t depth;         // patina_depth
+    // > 0: a light's samples double until their expected error is at most this share of its light. Expected from what the last doubling
+    // changed, root mean square over points in the penumbra; borders, a spacing wide, are off more. Whole textures, with shadow_lazy too. 0 = off.
+    float shadow_error;
+    uint32_t own_background; // 1 = background lies behind the points, and world_color only lights them
+    float background[3];     // linear, with own_background; not where the film is transparent
+    uint32_t surface;        // patina_surface
+    uint32_t shadow_uncut;   // 1 = what clips cut away still casts shadows
+    // Of a picture at rest, 1..4096; 0 = 1, with pixel_noise at most so many, 0 = 256. The colour is the mean of about so many samples a
+    // pixel: of finer pixels where that is truer, of shifted pictures for the rest, each smoothed and anti-aliased as set (truest with
+    // antialias on). Other passes and keys are those of one sample. Above 1 shadow textures are whole, in spite of shadow_lazy, and of
+    // shadow_progressive without pixel_progressive.
+    uint32_t pixel_samples;
+    uint32_t depth;          // patina_depth
     uint32_t world_directed; // 1 = ambient light differs by direction: world_light, not world_color, which stays the background
     float world_light[3][9]; // with world_directed, of red, green, blue: the irradiance over pi of a surface with the normal n
                              // (unit, world) as weights of 1, x, y, z, xy, yz, zx, x^2 - y^2, 3 z^2 - 1; below 0 it counts as 0
@@ -561,14 +551,13 @@ typedef struct patina_settings {
                                 // it. What comes in the end is the same to the bit
     float pixel_noise; // > 0: samples end once stats.pixel_error is at most this; of a region by its own pixels. Asked at
                        // certain numbers of samples, which neither threads nor steps change. 0 = pixel_samples as set
-    uint32_t average;  // 1: pixels of clouds that are filled show the mean of the points about their surface, each weighted
-                       // by how near their middle it fell, in place of the nearest point alone: colours, and normals where
-                       // points have them. Truer where several points fall into a pixel, steadier where a camera or an
-                       // object moves. Not where colours come from a ramp or points have opacities of their own; discs
-                       // show means either way
-    float detail;      // > 0: of clouds whose files hold them in levels, finer ones are left out where
-        // the points of the next coarser one lie at most so many pixels apart: for pictures on the way to the exact
-        // one, which read less. Not of what discs alone or range images show. 0 = all points
+    // 1 = pixels of filled clouds show the mean of the points about their surface, weighted by how near the pixel's middle each fell, not
+    // the nearest point: colours, and normals where points have them. Truer where several points fall into a pixel, steadier in motion.
+    // Not where colours come from a ramp or points have opacities of their own; discs show means either way.
+    uint32_t average;
+    // > 0: of clouds whose files hold them in levels, finer levels are left out where points of the next coarser one lie at most so many
+    // pixels apart: for quick pictures before the exact one. Not of what discs alone or range images show. 0 = all points.
+    float detail;
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
@@ -675,10 +664,10 @@ enum patina_pass {
         PATINA_PASS_COUNT
 };
 
-// What a picture of scattered points is expected to be off by, as measured on known shapes at the same spacing on screen
-// (build/curves): a sphere and a torus, smooth and evenly sampled. Edges, thin parts, sheets close behind each other, noise and scan
-// rows make it more: by `doubt` at most on the shapes that were tried. Wider apart than measured it grows as it did last; all are
-// +inf where points lie more than 64 pixels apart or no spacing is known.
+// What a picture of scattered points is expected to be off by, as measured on a smooth, evenly sampled sphere and torus at the same spacing
+// on screen (build/curves). Edges, thin parts, sheets close behind each other, noise and scan rows make it more: by `doubt` at most on the
+// shapes that were tried. Wider apart than measured it grows as it did last; all are +inf where points lie more than 64 pixels apart or no
+// spacing is known.
 typedef struct patina_expected_error {
     float color;    // root mean square over the pixels that are or should be covered, sRGB over grey, shares of white
     float coverage; // 1 - shared pixels / pixels covered by either
@@ -709,11 +698,10 @@ typedef struct patina_frame_stats {
     uint64_t chunks_cut;                  // in view, whose points were tested one by one
     uint32_t pixel_samples;               // whose mean every pixel is at least; 1: of the picture without samples
     uint32_t pixel_pending;               // progressive: samples a pixel that patina_frame_refine takes yet, at most
-    float pixel_error;     // expected standard error of the mean, shares of white in levels as sRGB's, root mean square over
-                           // the pixels whose samples differ; 0 = not known: fewer than two shifted pictures
-    uint64_t mapped_bytes; // of the scene's clouds in files that patina_cloud_open mapped
-    uint64_t
-        mapped_cap; // what of these was held at most, as planned: device_desc.mapped_cap; 0 = they fit, or OpenGL has copies
+    float pixel_error;        // expected standard error of the mean, shares of white in levels as sRGB's, root mean square over
+                              // the pixels whose samples differ; 0 = not known: fewer than two shifted pictures
+    uint64_t mapped_bytes;    // of the scene's clouds in files that patina_cloud_open mapped
+    uint64_t mapped_cap;      // how much of them may be held: device_desc.mapped_cap; 0 = they fit, or OpenGL has copies
     uint64_t mapped_held;     // and as it was measured
     uint64_t mapped_read;     // by passes over points, each counted; what pixels ask of single points comes to it
     uint32_t mapped_rounds;   // of the pass over points that took most; 0 where nothing is mapped
@@ -748,10 +736,9 @@ PATINA_API int patina_frame_read_layer(const patina_frame *frame, uint32_t layer
 // The nearest depth within two pixels of each pixel: what hides a host's overlays has to be that much wider than the surface. Both are
 // width * height floats, `size` bytes each, and not the same. Any thread.
 PATINA_API int patina_nearest_depths(const float *depths, uint32_t width, uint32_t height, float *nearest, size_t size);
-// The visibility keys of the first layer, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone
-// after a render that failed or was cancelled, and with a cloud that they show (PATINA_ERROR_EMPTY). Scenes of more than 2^32 - 2 points
-// and triangles have numbers that keys do not hold (PATINA_ERROR_TOO_MANY_POINTS): patina_frame_read_numbers. PATINA_ERROR_FILE: a mapped
-// cloud's file, which has the numbers, was cut short or cannot be read.
+// The visibility keys of the first layer, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone after a render
+// that failed or was cancelled, and with a cloud that they show (PATINA_ERROR_EMPTY). PATINA_ERROR_TOO_MANY_POINTS: keys do not hold the
+// numbers (patina_frame_read_numbers does). PATINA_ERROR_FILE: a mapped cloud's file, which has the numbers, cannot be read.
 PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
 // ---- shadow textures: kept by the frame while points, casters, lights' places and sizes, samples and resolution stay; lights'
 // power and colour, and lights and clouds that move together, change nothing. `light` counts the lights that cast.
@@ -765,24 +752,24 @@ PATINA_API int patina_frame_read_shadows(const patina_frame *frame, uint32_t ins
                                          size_t size);
 // Writes the frame's whole textures to a file, 1, 2 or 4 bytes a point and light, with what they depend on and a checksum.
 PATINA_API int patina_frame_save_shadows(const patina_frame *frame, const char *path);
-// Takes textures from such a file instead of computing them. PATINA_ERROR_FORMAT, and the frame as it was, when the file is
-// damaged, of another version, for other points, or stale: the message says which, and of which light or cloud.
+// Takes textures from such a file instead of computing them. PATINA_ERROR_FORMAT, and the frame as it was, if the file is damaged, of
+// another version, for other points, or stale: the message says which, and of which light or cloud.
 PATINA_API int patina_frame_load_shadows(patina_frame *frame, const patina_scene *scene, const char *path);
 
 PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats);
-// Milliseconds by pass, why each other pass was left out, and of each layer the points in chunks that were scattered and
-// the pixels that it covers, as JSON: {"passes":{..},"skipped":{..},"layers":[{"points":..,"pixels":..},..]}; one layer
-// that was not peeled has no pixel count. "lights":[{"samples":..,"error":..},..] of the casting lights' shadows;
-// "planes":{"peak":..,"held":..}: bytes that the plan came to before it ran, light maps apart, and those held after it, theirs too; where
-// there are soft points, "soft":{"parts":..,"records":..}: in how many parts they are drawn, and how many the largest has room for, at
-// 80 bytes each: peak counts them.
-// "samples":{"grid":..,"shifts":..}: how pixel_samples were taken, pixels on each side of one, times shifted.
-// "gl":{"dispatches":..,"empty":..,"barriers":..,"calls":..,"copies":..,"waits":..,"uploaded":..,"bytes":..} of an OpenGL device, "cpu":{"barriers":..,
-// "bytes":..} of the processor: what the render asked of it. empty: dispatches without a workgroup; indirect ones count in frames that are
-// measured. uploaded: bytes that the host hands over. copies: between buffers, and into parts of buffers. waits: calls that block until submitted work is done. barriers of the
-// processor: steps of several threads, each of which ends when all are done. bytes: what the passes read and write by the plan, each of
-// their buffers whole. "work":{"PASS":{..},..}: the same fields for each pass.
-// Returns the full length; truncates to size.
+// Statistics of the last render as a JSON object. Returns its full length; truncates to size.
+//   "passes":{..}, "skipped":{..}: milliseconds by pass, and why each other pass was left out.
+//   "layers":[{"points":..,"pixels":..},..]: points in chunks that were scattered, and pixels covered; no pixels without peeling.
+//   "lights":[{"samples":..,"error":..},..]: of the casting lights' shadows.
+//   "planes":{"peak":..,"held":..}: bytes that the plan came to before it ran, without light maps, and bytes held after it, with them.
+//   "soft":{"parts":..,"records":..}, with soft points: parts they are drawn in, and records of the largest, 80 bytes each in peak.
+//   "samples":{"grid":..,"shifts":..}: pixel_samples as pixels on each side of one, times shifted.
+//   "gl":{"dispatches":..,"empty":..,"barriers":..,"calls":..,"copies":..,"waits":..,"uploaded":..,"bytes":..}, OpenGL: what was asked of
+//     it. empty: dispatches without a workgroup, indirect ones in measured frames only. copies: between buffers, and into parts of them.
+//     waits: calls that block until submitted work is done. uploaded: bytes handed over. bytes: as below.
+//   "cpu":{"barriers":..,"bytes":..}, processor: steps of several threads, each of which ends when all are done; and bytes that the
+//     passes read and write by the plan, each of their buffers whole.
+//   "work":{"PASS":{..},..}: the fields of "gl" or "cpu" for each pass.
 PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
 // The plan as text, a line a pass, without rendering. Returns the full length.
 PATINA_API size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, char *buffer, size_t size);
@@ -791,7 +778,8 @@ PATINA_API int patina_frame_keep_planes(patina_frame *frame, uint32_t keep);
 // 1: from the next render on a GPU times each pass by itself, and empty indirect dispatches are counted. That costs a few calls for each
 // pass. 0, as at first: a GPU times the passes over points, and all others between them together, by the name "pixels".
 PATINA_API int patina_frame_measure(patina_frame *frame, uint32_t measure);
-// Writes every plane of the last render, but bins of discs and those that others took the place of, as raw little-endian files with a .txt line of their shape into a folder.
+// Writes every plane of the last render as a raw little-endian file into a folder, with a .txt line of its shape. Bins of discs are not
+// written, nor planes whose memory others took.
 PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *folder);
 
 #ifdef __cplusplus
