@@ -7,11 +7,8 @@
 #include <stdio.h>
 
 enum { PROGRAMS = PT_GL_VARIANTS - 2 }; // of fill's, the first of lib/fill_tiles.glsl: a phase each
-enum {
-    PIXEL = 12,
-    REST = 128,
-    MOST_SIDE = 64
-}; // shared bytes a pixel, and beside all of them; invocations hold four pixels each
+enum { PIXEL = 12, REST = 128 };        // shared bytes of a pixel, and beside all of them
+enum { MOST_SIDE = 64 };                // of a square: its 1024 invocations then hold four pixels each
 
 // A pair of planes: where they lie.
 struct state {

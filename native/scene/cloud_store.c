@@ -20,8 +20,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Files of version 13 have uncolored points that are black. Files of version 12 have no trust. Files of version 11 are also neither packed nor without order, and files of version 10 also have no
-// sums of pages.
+// Files of version 13 have uncolored points that are black. Files of version 12 also have no trust. Files of version 11 are also neither
+// packed nor without order, and files of version 10 also have no sums of pages.
 enum {
     SECTION = 1 << 16,
     VERSION = 14,
@@ -539,7 +539,7 @@ static void move_by(struct patina_cloud *cloud, const double offset[3])
     }
 }
 
-// An analysis of an older version has no trust, or leaves points without a color black. The caller analyzes the cloud again, as one that never was.
+// Removes the analysis of an older version, which has no trust or leaves points without a color black. The caller analyzes the cloud again.
 static void forget_analysis(const char *path, struct patina_cloud *cloud, const struct pt_section *shapes)
 {
     pt_log(PT_LOG_WARNING, "%s: saved by an older version. The points are analyzed again, for their trust and colors.", path);

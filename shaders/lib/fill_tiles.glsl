@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // fill on a GPU: several steps of a phase in one dispatch, to the bits of kernels/fill.comp. A workgroup holds a square of SIDE pixels
 // in shared memory, takes the steps there and writes what lies `guard` pixels inside: steps depend on neighbors, so what is wrong
-// moves inwards from the border by a pixel a step (by two where strays close nothing). native/device_gl/fill.c counts the pixels.
+// moves inwards from the border by a pixel a step (by two where strays close nothing). native/device_gl/fill_tiles.c counts the pixels.
 //   PHASE: PT_FILL_BACKGROUND or PT_FILL_OCCLUDED; SIDE: of the square
 // A pixel is an entry of the phase where it differs from what was kept before the phase: each fill takes a lesser key.
 #version 430 core

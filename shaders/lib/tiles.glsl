@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Filters walk tiles, 8 x 8 pixels each, counted from view.rect's corner: in software a list of those that hold something,
-// which pt_gl_tiles makes, on a GPU all of them: making the list costs more dispatches than it saves pixels. A workgroup takes four tiles and an invocation a line of one, so that what is read once a kernel is read
-// once for eight pixels. (llvmpipe runs masked lanes to the end: leaving background out of the list is what skips it.)
+// Filters walk tiles, 8 x 8 pixels each, counted from view.rect's corner. In software they walk a list of those that hold something, which
+// pt_gl_tiles makes: llvmpipe runs masked lanes to the end, so that only the list skips background. On a GPU they walk all tiles, since a
+// list takes longer than the tiles that it saves. A workgroup takes four tiles and an invocation a line of one, so that what is read once
+// a kernel is read once for eight pixels.
 #ifndef PT_TILES_GLSL
 #define PT_TILES_GLSL
 
