@@ -35,11 +35,6 @@ struct grading {
     const struct patina_grade *grade; // of the cloud or of a part, as the cloud
 };
 
-static double to_srgb(double linear)
-{
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pt_pow(linear, 1.0 / 2.4) - 0.055;
-}
-
 // Warm: more red and less blue, at the luminance of white.
 static void set_factors(const patina_scan_grade *grade, const float *balance, struct tone *tone)
 {
@@ -59,7 +54,7 @@ static void encode_steps(struct tone *tone)
 {
     for (int i = 0; i < STEPS; i++) {
         const double root = (double)i / (STEPS - 1), light = pt_pow(root * root, (double)tone->power);
-        tone->encode[i] = (uint8_t)(255.0 * to_srgb(light) + 0.5);
+        tone->encode[i] = (uint8_t)(255.0 * pt_srgb_of_linear(light) + 0.5);
     }
 }
 

@@ -66,13 +66,11 @@ static void light_of(const struct search *search, size_t slot, double light[3])
 static void set_color(const struct search *search, size_t slot, const double light[3])
 {
     struct pt_uncolored *job = search->job;
-    for (size_t k = 0; k < 3; k++) {
-        const double c = light[k] <= 0.0031308 ? 12.92 * light[k] : 1.055 * pt_pow(light[k], 1.0 / 2.4) - 0.055;
+    for (size_t k = 0; k < 3; k++)
         if (job->cloud->color_format == PT_COLOR_SRGB8)
-            ((uint8_t *)job->colors)[3 * slot + k] = (uint8_t)(255.0 * c + 0.5);
+            ((uint8_t *)job->colors)[3 * slot + k] = (uint8_t)(255.0 * pt_srgb_of_linear(light[k]) + 0.5);
         else
             ((float *)job->colors)[3 * slot + k] = (float)light[k];
-    }
 }
 
 // Whether the point in a lane got the mean of its neighbors' colors.

@@ -207,3 +207,17 @@ patina_cloud *points_upload(const struct points *points)
     CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
     return cloud;
 }
+
+patina_cloud *cloud_of_colors(uint64_t count, const void *position, const void *color, uint32_t type, uint32_t threads)
+{
+    patina_cloud *cloud = NULL;
+    const patina_cloud_desc desc = {.struct_size = sizeof desc,
+                                    .count = count,
+                                    .threads = threads,
+                                    .position = {position, PATINA_FLOAT64, 3, 0},
+                                    .color = {color, type, 3, 0}};
+    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
+    return cloud;
+}
+
+double srgb_of_linear(double light) { return light <= 0.0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - 0.055; }

@@ -47,5 +47,10 @@ void points_transform(struct points *points, const double matrix[9], const doubl
 
 patina_cloud_desc points_desc(const struct points *points);
 patina_cloud *points_upload(const struct points *points); // fails the test on error
+// A cloud of float64 positions in which each point has a color: of type PATINA_UINT8 in sRGB, of PATINA_FLOAT32 linear. Fails the test on
+// error.
+patina_cloud *cloud_of_colors(uint64_t count, const void *position, const void *color, uint32_t type, uint32_t threads);
+
+double srgb_of_linear(double light); // 0..1, by the C library's pow
 
 #endif

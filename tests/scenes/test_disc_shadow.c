@@ -82,7 +82,7 @@ static int at_border(const patina_camera *camera, const patina_light_desc *light
     return fabs(passes(p, to, &along) - radius) < width;
 }
 
-static double srgb(double c) { return 255.0 * (c <= 0.0031308 ? 12.92 * c : 1.055 * pow(fmin(c, 1.0), 1.0 / 2.4) - 0.055); }
+static double level_of(double light) { return 255.0 * srgb_of_linear(fmin(light, 1.0)); }
 
 // Share of the shadow's border pixels that change by more than JUMP levels between two views `turn` apart, over some pairs.
 static double jumps(patina_device *device, double density, uint32_t type, uint32_t samples)
@@ -106,7 +106,8 @@ static double jumps(patina_device *device, double density, uint32_t type, uint32
         for (int i = 0; i < SIZE * SIZE; i++) {
             if (!at_border(&cameras[0], &light, i % SIZE, i / SIZE, width))
                 continue;
-            const double one = srgb((double)pictures[0].combined[4 * i]), other = srgb((double)pictures[1].combined[4 * i]);
+            const double one = level_of((double)pictures[0].combined[4 * i]),
+                         other = level_of((double)pictures[1].combined[4 * i]);
             all++;
             far += fabs(one - other) > JUMP;
         }

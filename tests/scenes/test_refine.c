@@ -241,10 +241,8 @@ static double levels_off(const struct picture *a, const struct picture *b)
         double most = 0.0;
         for (int k = 0; k < 3; k++) {
             double level[2];
-            for (int j = 0; j < 2; j++) {
-                const double v = fmin(fmax((double)(j ? b : a)->combined[4 * i + k], 0.0), 1.0);
-                level[j] = v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055;
-            }
+            for (int j = 0; j < 2; j++)
+                level[j] = srgb_of_linear(fmin(fmax((double)(j ? b : a)->combined[4 * i + k], 0.0), 1.0));
             most = fmax(most, fabs(level[0] - level[1]));
         }
         sum += most * most;

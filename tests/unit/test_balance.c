@@ -18,8 +18,6 @@ struct scanned {
     uint16_t scan[POINTS];
 };
 
-static double srgb(double c) { return c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1 / 2.4) - 0.055; }
-
 // Strips of a wall, each half over the next, in light that its scan multiplied by gains. `wrong` of the points have any color.
 static struct scanned *strips(const double gains[SCANS][3], double apart, double wrong, uint32_t seed)
 {
@@ -35,7 +33,7 @@ static struct scanned *strips(const double gains[SCANS][3], double apart, double
         for (int k = 0; k < 3; k++) {
             const double light = 0.18 + 0.1 * sin(5 * x + k) * cos(4 * y) + pcg_between(&random, -0.02, 0.02);
             const double seen = off ? pcg_between(&random, 0, 1) : fmin(1, light * gains[scan][k]);
-            s->bytes[i][k] = (uint8_t)(255 * srgb(seen) + 0.5);
+            s->bytes[i][k] = (uint8_t)(255 * srgb_of_linear(seen) + 0.5);
             s->floats[i][k] = (float)seen;
         }
     }
@@ -44,15 +42,8 @@ static struct scanned *strips(const double gains[SCANS][3], double apart, double
 
 static patina_cloud *cloud_of(const struct scanned *s, int floats, uint32_t threads)
 {
-    patina_cloud *cloud = NULL;
-    const patina_cloud_desc desc = {
-        .struct_size = sizeof desc,
-        .count = POINTS,
-        .threads = threads,
-        .position = {s->position, PATINA_FLOAT64, 3, 0},
-        .color = {floats ? (const void *)s->floats : s->bytes, floats ? PATINA_FLOAT32 : PATINA_UINT8, 3, 0}};
-    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
-    return cloud;
+    return floats ? cloud_of_colors(POINTS, s->position, s->floats, PATINA_FLOAT32, threads)
+                  : cloud_of_colors(POINTS, s->position, s->bytes, PATINA_UINT8, threads);
 }
 
 // The worst factor between gains * found, of each scan in parts of that of the first.
@@ -168,12 +159,7 @@ static void test_many_scans(void **state)
         scan[i] = (uint16_t)of;
         memset(color + 3 * i, of % 2 ? 120 : 150, 3);
     }
-    patina_cloud *cloud = NULL;
-    const patina_cloud_desc desc = {.struct_size = sizeof desc,
-                                    .count = MANY * EACH,
-                                    .position = {position, PATINA_FLOAT64, 3, 0},
-                                    .color = {color, PATINA_UINT8, 3, 0}};
-    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
+    patina_cloud *cloud = cloud_of_colors(MANY * EACH, position, color, PATINA_UINT8, 0);
     float *found = malloc(3 * MANY * sizeof *found);
     CHECK(patina_cloud_balance(cloud, scan, MANY, NULL, found), cloud);
     uint32_t near = 0;

@@ -389,7 +389,6 @@ static void test_pick(void **state)
 // ---- grades ---------------------------------------------------------------------------------------------------------------
 
 static double linear_of(double srgb) { return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4); }
-static double srgb_of(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055; }
 
 static void graded(const patina_scan_grade *g, double c[3])
 {
@@ -448,7 +447,8 @@ static void test_grades(void **state)
             seen[scans[id]]++;
             for (int k = 0; k < 3; k++) {
                 const double got = (double)picture.combined[4 * i + (uint32_t)k];
-                worst = fmax(worst, floats ? fabs(got - c[k]) / fmax(1, c[k]) : fabs(srgb_of(got) - srgb_of(fmin(c[k], 1))));
+                worst = fmax(worst, floats ? fabs(got - c[k]) / fmax(1, c[k])
+                                           : fabs(srgb_of_linear(got) - srgb_of_linear(fmin(c[k], 1))));
             }
         }
         for (int k = 0; k < 5; k++)

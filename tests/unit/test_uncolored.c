@@ -22,8 +22,6 @@ struct wall {
     uint8_t black[POINTS];
 };
 
-static double srgb(double c) { return c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1 / 2.4) - 0.055; }
-
 // A rough wall of smooth colors, a share of which is black; strays before it are bright red.
 static struct wall *wall_of(double share, uint32_t seed)
 {
@@ -37,7 +35,7 @@ static struct wall *wall_of(double share, uint32_t seed)
         w->black[i] = i < WALL && pcg_between(&random, 0, 1) < share;
         for (int k = 0; k < 3; k++) {
             const double light = 0.3 + 0.2 * sin(0.05 * column + k) * cos(0.04 * row);
-            w->color[i][k] = w->black[i] ? 0 : i < WALL ? (uint8_t)(255 * srgb(light) + 0.5) : k ? 0 : 255;
+            w->color[i][k] = w->black[i] ? 0 : i < WALL ? (uint8_t)(255 * srgb_of_linear(light) + 0.5) : k ? 0 : 255;
             w->light[i][k] = (float)pt_linear_of_srgb(w->color[i][k] / 255.0);
         }
     }
@@ -46,15 +44,8 @@ static struct wall *wall_of(double share, uint32_t seed)
 
 static patina_cloud *cloud_of(const struct wall *w, int floats, uint32_t threads)
 {
-    patina_cloud *cloud = NULL;
-    const patina_cloud_desc desc = {
-        .struct_size = sizeof desc,
-        .count = POINTS,
-        .threads = threads,
-        .position = {w->position, PATINA_FLOAT64, 3, 0},
-        .color = {floats ? (const void *)w->light : w->color, floats ? PATINA_FLOAT32 : PATINA_UINT8, 3, 0}};
-    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
-    return cloud;
+    return floats ? cloud_of_colors(POINTS, w->position, w->light, PATINA_FLOAT32, threads)
+                  : cloud_of_colors(POINTS, w->position, w->color, PATINA_UINT8, threads);
 }
 
 static void analyse(patina_cloud *cloud, uint32_t threads, uint32_t keep)
@@ -127,7 +118,8 @@ static void test_reference(void **state)
                     continue;
                 for (int k = 0; k < 3; k++) {
                     const double mean = sum[k] / with;
-                    light[3 * i + k] = floats ? (double)(float)mean : pt_linear_of_srgb(floor(255 * srgb(mean) + 0.5) / 255);
+                    light[3 * i + k] = floats ? (double)(float)mean
+                                              : pt_linear_of_srgb(floor(255 * srgb_of_linear(mean) + 0.5) / 255);
                 }
                 round_of[i] = (uint8_t)round;
                 filled++;
