@@ -598,13 +598,16 @@ void pt_analysis_free(struct pt_analysis *analysis)
 // What cannot fail comes last: a cloud is analysed or as it was.
 int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
 {
+    const uint64_t words = cloud->slots * 4;
     struct patina_cloud next = *cloud;
     next.chunks = analysis->chunks;
     next.spacing_base = analysis->spacing_base;
     if (pt_cloud_settle_spacing(&next))
         return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "taking an analysis: out of memory");
-    cloud->info.bytes += cloud->shapes ? 0 : cloud->slots * 4;
-    cloud->info.bytes += analysis->colors && cloud->mapped >> PT_ARRAY_COLORS & 1u ? analysis->color_bytes : 0;
+    cloud->info.bytes += 2 * words + (analysis->colors ? analysis->color_bytes : 0);
+    cloud->info.bytes -= pt_cloud_own_bytes(cloud, PT_ARRAY_SURFELS, words);
+    cloud->info.bytes -= cloud->shapes ? pt_cloud_own_bytes(cloud, PT_ARRAY_SHAPES, words) : 0;
+    cloud->info.bytes -= analysis->colors ? pt_cloud_own_bytes(cloud, PT_ARRAY_COLORS, analysis->color_bytes) : 0;
     cloud->info.bytes += cloud->sights.bytes ? 0 : analysis->sights.bytes;
     cloud->info.spacing = next.info.spacing;
     cloud->info.spacing_min = next.info.spacing_min;

@@ -755,7 +755,8 @@ static int replace_colors(struct build *build)
     cloud->info.invalid_colors = cloud->info.uncolored = 0;
     for (uint32_t i = 0; i < pt_part_count(cloud); i++)
         cloud->info.invalid_colors += color_part(build, pt_part(cloud, i));
-    cloud->info.bytes += (cloud->colors ? pt_color_bytes(cloud) : 0) - (old ? old_bytes : 0);
+    cloud->info.bytes += cloud->colors ? pt_color_bytes(cloud) : 0;
+    cloud->info.bytes -= old ? pt_cloud_own_bytes(cloud, PT_ARRAY_COLORS, old_bytes) : 0;
     cloud->info.has_colors = cloud->color_format != PT_COLOR_NONE;
     cloud->mapped &= ~(1u << PT_ARRAY_COLORS);
     pt_parts_follow(cloud);

@@ -185,6 +185,11 @@ uint64_t pt_cloud_copied_bytes(const struct patina_cloud *cloud);  // of what it
 uint32_t pt_cloud_largest_chunk(const struct patina_cloud *cloud); // slots
 uint32_t pt_cloud_array_bytes(const struct patina_cloud *cloud, enum pt_array array); // of a point, where the cloud has it
 uint32_t pt_cloud_point_bytes(const struct patina_cloud *cloud, enum pt_array array); // of a point in the file; 0: not mapped
+// Size in bytes of an array that the cloud has, as info.bytes counts it: 0 of a mapped file.
+static inline uint64_t pt_cloud_own_bytes(const struct patina_cloud *cloud, enum pt_array array, uint64_t size)
+{
+    return cloud->mapped >> array & 1u ? 0 : size;
+}
 // No page of the file is held any longer than until it is read again; any thread, whoever reads.
 void pt_cloud_return(const struct patina_cloud *cloud);
 // Points of these slots are read soon: of arrays, bits 1 << pt_array.

@@ -90,7 +90,8 @@ static int take_scalars(struct patina_cloud *cloud, const patina_array *scalar)
     for (uint64_t i = 0; values && i < cloud->slots; i++)
         values[i] = read_value(scalar, pt_number_of(cloud, i));
     measure_scalars(cloud, values);
-    cloud->info.bytes += (values ? size : 0) - (cloud->scalars ? size : 0);
+    cloud->info.bytes += values ? size : 0;
+    cloud->info.bytes -= cloud->scalars ? pt_cloud_own_bytes(cloud, PT_ARRAY_SCALARS, size) : 0;
     cloud->mapped &= ~(1u << PT_ARRAY_SCALARS);
     pt_pages_free(cloud->scalars, size);
     cloud->scalars = values;

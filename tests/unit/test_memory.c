@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Anonymous memory of a cloud: at most 24 bytes a point at rest (position, colour, normal), at most 16 more while it is
 // built; the caller's own arrays are not counted. Measured by the kernel's own books, not by the library's.
+#include "scene/cloud.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 
@@ -104,8 +105,54 @@ static void test_bytes_a_point(void **state)
     measure(2000000, POINTS_ALL, 1, 24.0, 24.0 + 16.0);
 }
 
+static uint64_t told(const patina_cloud *cloud)
+{
+    patina_cloud_info info = {.struct_size = sizeof info};
+    CHECK(patina_cloud_get_info(cloud, &info), cloud);
+    return info.bytes;
+}
+
+// Arrays of a mapped file are no anonymous memory; what replaces them is.
+static void test_bytes_of_mapped(void **state)
+{
+    (void)state;
+    const char *path = "bytes-of-mapped.cloud";
+    struct points points = points_torus(20000, 1.0, 0.4, POINTS_ALL, 5);
+    patina_cloud_desc desc = points_desc(&points);
+    desc.scalar = (patina_array){points.position, PATINA_FLOAT32, 1, 12};
+    const patina_array none = {0};
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
+    CHECK(patina_cloud_save(cloud, path), cloud);
+    patina_cloud_destroy(cloud);
+    CHECK(patina_cloud_open(path, &cloud), NULL);
+    const uint64_t before = told(cloud), four = 4 * cloud->slots, colors = pt_color_bytes(cloud);
+    assert_true(before < colors);
+    for (int turn = 0; turn < 2; turn++) { // mapped at first, then the cloud's own
+        CHECK(patina_cloud_set_colors(cloud, &none), cloud);
+        CHECK(patina_cloud_set_scalars(cloud, &none), cloud);
+        assert_int_equal(told(cloud), before);
+        CHECK(patina_cloud_set_colors(cloud, &desc.color), cloud);
+        CHECK(patina_cloud_set_scalars(cloud, &desc.scalar), cloud);
+        assert_int_equal(told(cloud), before + colors + four);
+    }
+    for (int turn = 0; turn < 2; turn++) { // surface words and shapes
+        CHECK(patina_cloud_analyse(cloud, NULL, NULL), cloud);
+        assert_int_equal(told(cloud), before + colors + 3 * four);
+    }
+    CHECK(patina_cloud_save(cloud, path), cloud);
+    patina_cloud_destroy(cloud);
+    CHECK(patina_cloud_open(path, &cloud), NULL);
+    const uint64_t opened = told(cloud);
+    CHECK(patina_cloud_analyse(cloud, NULL, NULL), cloud);
+    assert_int_equal(told(cloud), opened + 2 * four);
+    patina_cloud_destroy(cloud);
+    unlink(path);
+    points_free(&points);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bytes_a_point)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bytes_a_point), cmocka_unit_test(test_bytes_of_mapped)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
