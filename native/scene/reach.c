@@ -9,9 +9,9 @@
 #include <math.h>
 
 // Of footprints, where discs alone make the surface: a footprint ends about where its neighbors' begin, and filling closes what lies
-// between. At 1.9 no pixel of a sphere or a torus of random points stays open (tests/scenes/test_truth), and colors and depths are nearer to
-// the truth than at 1.95 and above. Borders, lines and foliage end where they end.
-#define SURFACE_SCALE 1.9f
+// between. At 1.55 depths of a sphere of random points lie beyond their bounds (tests/scenes/test_truth); at 1.8 contour lines through few
+// points do (test_values), since wide discs mix the values of far neighbors. Borders, lines and foliage end where they end.
+#define SURFACE_SCALE 1.7f
 
 float pt_surface_scale(const struct patina_scene *scene)
 {
