@@ -477,7 +477,7 @@ static void test_refusals(void **state)
     assert_int_equal(patina_mask_create(NULL, s->hidden, NULL, BYTES, &mask), PATINA_ERROR_ARGUMENT);
     assert_null(mask);
     assert_int_equal(patina_grade_create(s->cloud, NULL, &bad, 1, &grade), PATINA_ERROR_ARGUMENT);
-    assert_int_equal(patina_grade_create(s->cloud, NULL, &good, 2000, &grade), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_grade_create(s->cloud, NULL, &good, 65536, &grade), PATINA_ERROR_ARGUMENT);
     const float dark[3] = {1, -1, 1};
     assert_int_equal(patina_grade_create_balanced(s->cloud, NULL, &good, dark, 1, 0, &grade), PATINA_ERROR_ARGUMENT);
     assert_int_equal(patina_grade_create_balanced(s->cloud, NULL, &good, NULL, 1, 2, &grade), PATINA_ERROR_ARGUMENT);
