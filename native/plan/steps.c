@@ -65,11 +65,22 @@ static void clear_keys(struct pt_builder *builder, struct pt_ref plane, const ch
     add_clear(builder, plane, (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8, reason);
 }
 
+// Whether some points lie in a file. Its boxes may be wrong, or it may lose pages: then points appear in pixels that no pass resolves.
+static int reads_files(const struct pt_plan *plan)
+{
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        if (plan->instances[i].instance->cloud->mapped >> PT_ARRAY_POSITIONS & 1u)
+            return 1;
+    return 0;
+}
+
 void pt_plan_clears(struct pt_builder *builder, int shown)
 {
     enum { NOWHERE = 0x7FC00000 }; // the bits of a NaN
     struct pt_plan *plan = builder->plan;
     clear_keys(builder, pt_keys_of(builder, 0), "no point is drawn");
+    if (pt_plan_shows(plan) && reads_files(plan))
+        add_clear(builder, pt_from_of(builder, 0), 0, 4, "a damaged file's points may lie outside their boxes");
     if (plan->mesh.triangles)
         clear_keys(builder, pt_plane_at(PT_PLANE_MESH_KEYS, 0), "no triangle is drawn");
     if (!plan->mesh.triangles || !shown)

@@ -109,9 +109,11 @@ static inline patina_cloud *fuzz_cloud(int with_opacities)
     return cloud;
 }
 
+// Its frames' planes hold what no pass wrote: poison, so that who reads it ends.
 static inline patina_device *fuzz_device(void)
 {
     patina_device *device = NULL;
+    setenv("PATINA_POISON_PLANES", "1", 1);
     patina_device_desc desc = {.struct_size = sizeof desc, .name = "cpu", .threads = 1};
     REQUIRE(patina_device_create(&desc, &device) == PATINA_OK);
     return device;

@@ -12,8 +12,8 @@ enum {
     SECTION = 1 << 16,
     INFO = 96, // bytes of the header before what a cloud tells
     CHECK = INFO + offsetof(patina_cloud_info, packed) + 8 * PT_ARRAYS,
-    TAIL = CHECK + 8, // page_sum, packed_error, packed and unordered, trusts
-    TAIL_SIZE = 24 + 128
+    TAIL = CHECK + 8, // page_sum, packed_error, packed and unordered, trusts, uncolored
+    TAIL_SIZE = 24 + 136
 };
 
 static struct {
