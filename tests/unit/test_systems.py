@@ -58,6 +58,16 @@ class Systems(unittest.TestCase):
         self.assertIn("Check-Valid-Until", (self.out / "systems/sid/etc/apt/apt.conf.d/90patina").read_text())
         self.assertTrue(os.access(self.out / "blender-5.2", os.X_OK) and os.access(self.out / "in-sid", os.X_OK))
 
+    def test_programs_run_in_the_old_memory_layout(self):
+        """Software Vulkan needs it: otherwise Blender runs out of memory mappings after some hundred redraws."""
+        if subprocess.run(["setarch", "-L", "true"], capture_output=True, check=False).returncode:
+            self.skipTest("this machine does not allow setarch -L")
+        self.run_it("5.2")
+        self.stand_in("unshare", "cat /proc/self/personality")
+        done = subprocess.run([self.out / "blender-5.2"], capture_output=True, text=True, check=True,
+                              env=os.environ | {"PATH": f"{self.tools}:{os.environ['PATH']}"})
+        self.assertTrue(int(done.stdout, 16) & 0x0200000, done.stdout)
+
     def test_other_packages_make_it_anew(self):
         self.run_it("4.3")
         stamp = self.out / "systems/trixie.ready"
