@@ -20,15 +20,8 @@ def name() -> str:
     """Blender's backend and device, as in "Vulkan, llvmpipe"."""
     if bpy.app.background and not hasattr(gpu, "init"):
         return "none"
-    return f"{_NAMES.get(_backend(), _backend())}, {gpu.platform.renderer_get()}"
-
-
-def _backend() -> str:
-    return gpu.platform.backend_type_get() if hasattr(gpu.platform, "backend_type_get") else 'OPENGL'  # 3.5 and later tell
-
-
-def is_vulkan() -> bool:
-    return _backend() == 'VULKAN'
+    backend = gpu.platform.backend_type_get() if hasattr(gpu.platform, "backend_type_get") else 'OPENGL'  # 3.5 and later tell
+    return f"{_NAMES.get(backend, backend)}, {gpu.platform.renderer_get()}"
 
 
 def _lacks(error: Exception) -> GraphicsError:

@@ -4,8 +4,7 @@
 Blender draws vertices without faces as black dots or not at all, and PointClouds gray in Solid shading, whatever its Color option says
 (3.4 to 5.2). Material Preview shows a PointCloud with its material, so nothing is added there. Each cloud gives up to as many points as
 the preferences allow: as discs that fill the spacing, drawn after the overlays, hidden by what Blender has drawn nearer. Nothing of the
-scene changes. Objects in Edit Mode and linked files are left to Blender. On Vulkan nothing is drawn: in Blender 5.2.2 on lavapipe, a copy of
-memory within Blender's own redraw ended it a minute or two after thinned points were drawn (three sessions of three), and never without them.
+scene changes. Objects in Edit Mode and linked files are left to Blender.
 """
 
 from __future__ import annotations
@@ -183,7 +182,7 @@ def _create() -> gpu.types.GPUShader:
 def _draw() -> None:
     context = bpy.context
     space, budget = context.space_data, preferences.preview_points()
-    if not budget or space.shading.type not in SHADINGS or graphics.is_vulkan():
+    if not budget or space.shading.type not in SHADINGS:
         return
     key = (context.view_layer.as_pointer(), budget)
     if key not in _drawn:

@@ -31,7 +31,7 @@ ONCE = {"a_changed_link_keeps_nobody_waiting", "a_damaged_cache_is_mended", "a_s
 DRAWN = {"a_new_size_shows_no_stretched_picture", "box_in_the_view", "brush_in_the_view", "clipping_region", "coarse_pictures_fill_the_view",
          "draws_points", "edit_mode_selects_and_deletes", "edit_mode_shows_what_is_selected", "framing_begins_the_view_farther_away", "leaving_midway",
          "overlays_are_hidden_by_points", "panels_are_drawn_without_errors", "points_hide_their_dots", "quad_view", "the_world_lies_behind",
-         "toggling_lets_go", "too_bright_is_white",
+         "thinned_points_are_hidden_by_what_is_nearer", "toggling_lets_go", "too_bright_is_white",
          "what_changes_is_read", "what_is_left_out_shows_no_dots", "wide_points_hide_their_dots",
          "wide_points_leave_what_is_before_them"}
 # What an option runs, and how the results call these tests.
