@@ -15,7 +15,8 @@ of them, in the same order; "absent" what could not be measured, and why.
               those of these groups
 
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
-into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
+into Blender), viewport (orbiting 10 million in its window), frames (the same in each Blender that
+build/blender provides, in turns; 45 minutes), tests (what tests find), leaves (shadows on real scans), scans (virtual
 scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
 (ten minutes of work in Blender), analysis (what every point knows, 10 million), files (a town of 100 million points under a cap, 1.9 GB
 on the disk), walk (frame by frame
@@ -73,7 +74,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "scans", "independent", "session", "analysis", "files", "walk", "ranges", "soft", "platforms", "gpu", "scaling")
+          "frames", "leaves", "scans", "independent", "session", "analysis", "files", "walk", "ranges", "soft", "platforms", "gpu", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -214,8 +215,9 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
                lambda options: imports.measure(1_000_000 if options.quick else 30_000_000, options.library)),
     "viewport": ("viewport", "Viewport",
                  lambda options: window.measure(1_000_000 if options.quick else 10_000_000, options.library)),
-    "frames": ("viewport", "Frames of each Blender",
-               lambda options: window.versions((1_000_000,) if options.quick else (1_000_000, 10_000_000), options.library)),
+    "frames": ("frames", "Frames of each Blender",
+               lambda options: window.versions((1_000_000,) if options.quick else (1_000_000, 10_000_000), options.library,
+                                               1 if options.quick else window.ROUNDS)),
     "leaves": ("leaves", "Specks of shadows", lambda options: quoted.leaves(options.library)),
     "analysis": ("analysis", "What every point knows",
                  lambda options: analysis.times(1_000_000 if options.quick else 10_000_000, options.library)),

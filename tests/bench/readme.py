@@ -228,7 +228,7 @@ def update(result: dict[str, Any], root: Path) -> str:
             parts[f"papers {quality}"] = papers.table(result, quality)
     for name, part in result["parts"].items():
         if not any(line.startswith("skip") for line in part["text"].splitlines()):
-            parts[name] = hard(part["text"]) if name == "hard" else part["text"]
+            parts[name] = hard(part["text"]) if name == "hard" else f"{title}.\n\n" * (name == "frames") + part["text"]
     told = []
     for page in PAGES:
         path = root / page

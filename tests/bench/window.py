@@ -7,11 +7,14 @@ window through llvmpipe.
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
+from statistics import median
 
 ROOT = Path(__file__).resolve().parents[2]
 ROWS = (
@@ -32,40 +35,56 @@ ROWS = (
 )
 
 
-VERSIONS = (("3.4", "opengl"), ("5.2", "opengl"), ("5.2", "vulkan"))
+VERSIONS = (("3.4", "opengl"), ("4.3", "opengl"), ("5.2", "opengl"), ("5.2", "vulkan"))
+ROUNDS = 3
+LONGEST = 1500  # s, of a session
 PARTS = (  # of a frame, with overlays hidden or shown
-    ("a redraw of the orbit, all of it", "whole_ms"),
-    ("Blender alone, Patina's drawing left out", "bare_ms"),
+    ("a redraw of the orbit", "whole_ms"),
+    ("the same by the clock", "whole_clock_ms"),
+    ("Blender alone, without Patina's drawing", "bare_ms"),
+    ("the same by the clock", "bare_clock_ms"),
     ("with the last image uploaded and drawn, without a new one", "shown_ms"),
-    ("of that the upload of the image", "upload_ms"),
-    ("of that the search for the nearest depths around each pixel", "cover_ms"),
-    ("of that drawing the image, and uploading its depths", "draw_ms"),
-    ("of that erasing the overlays behind the points", "after_ms"),
-    ("Patina's work on a new image while moving, ms by the clock", "picture_ms"),
+    ("of that, upload of the image", "upload_ms"),
+    ("of that, nearest depths around each pixel", "cover_ms"),
+    ("of that, drawing the image and uploading its depths", "draw_ms"),
+    ("of that, erasing the overlays behind the points", "after_ms"),
+    ("sum of these four: Patina's cost beyond rendering", "beyond_ms"),
+    ("rendering of a new image while moving, by the clock", "picture_ms"),
 )
 
 
-def versions(counts: tuple[int, ...], library: Path) -> str:
-    """A table of what a frame takes in each Blender that is there, or "skip: " and why there is none."""
+def versions(counts: tuple[int, ...], library: Path, rounds: int = ROUNDS) -> str:
+    """A table of what a frame takes in each available Blender, medians of several rounds. Each round measures all Blenders in turn.
+    Returns "skip: " and the reason if none is available."""
     if not shutil.which("xvfb-run"):
         return "skip: needs xvfb-run (build/setup test)."
-    tables, notes = [], []
-    for points in counts:
-        found = {}
-        for version, backend in VERSIONS:
+    found: dict[int, dict[str, list[dict]]] = {points: {} for points in counts}
+    notes = []
+    try:
+        for index, points, (version, backend) in itertools.product(range(rounds), counts, VERSIONS):
+            name = f"{version} {'OpenGL' if backend == 'opengl' else 'Vulkan'}"
             got = _frames(points, version, backend, library)
+            print(f"frames: round {index + 1}, {name}, {points:,} points: {got if isinstance(got, str) else json.dumps(got)}", file=sys.stderr)
             if isinstance(got, str):
-                notes.append(f"Blender {version}, {backend}: {got}")
+                notes.append(f"Blender {name}, {points:,} points, round {index + 1}: {got}")
             else:
-                found[f"{version} {'OpenGL' if backend == 'opengl' else 'Vulkan'}"] = got
-        if found:
-            some = next(iter(found.values()))
-            rows = [f"| {points:,} points, {some['width']} × {some['height']}, overlays | | " + " | ".join(found) + " |",
-                    "|---|---|" + "---|" * len(found)]
-            for overlays in ("hidden", "shown"):
-                rows += [f"| {overlays} | {label} | " + " | ".join(f"{got[overlays][key]:.1f}" for got in found.values()) + " |" for label, key in PARTS]
-            tables.append("\n".join(rows))
+                found[points].setdefault(name, []).append(got)
+    except KeyboardInterrupt:
+        print("frames: canceled. The table has the finished sessions.", file=sys.stderr)
+    tables = [_table(points, found[points]) for points in counts if found[points]]
     return "\n\n".join([*tables, *notes]) if tables else f"skip: {'; '.join(notes)}"
+
+
+def _table(points: int, found: dict[str, list[dict]]) -> str:
+    """Medians. found: what the sessions of each Blender measured."""
+    some, times = next(iter(found.values()))[0], sorted({len(sessions) for sessions in found.values()})
+    rounds = " to ".join(str(count) for count in dict.fromkeys((times[0], times[-1])))
+    rows = [f"| {points:,} points, {some['width']} × {some['height']}, ms, medians of {rounds}; overlays | | " + " | ".join(found) + " |",
+            "|---|---|" + "---|" * len(found)]
+    for overlays in ("hidden", "shown"):
+        rows += [f"| {overlays} | {label} | " + " | ".join(f"{median(got[overlays][key] for got in sessions):.1f}" for sessions in found.values()) + " |"
+                 for label, key in PARTS]
+    return "\n".join(rows)
 
 
 def _frames(points: int, version: str, backend: str, library: Path) -> dict | str:
@@ -82,7 +101,10 @@ def _measured(blender: list[str], what: str, points: int, library: Path) -> dict
     command = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", *blender, "--enable-event-simulate", "--factory-startup", "--python",
                str(ROOT / "tests/blender/test_window.py"), "--", what]
     environment = {**os.environ, "PATINA_LIBRARY": str(library), "PATINA_FIGURES_POINTS": str(points)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        return f"ended after {LONGEST} s"
     found = [line for line in done.stdout.splitlines() if line.startswith('{"points"')]
     return json.loads(found[-1]) if found and not done.returncode else (done.stdout.strip().splitlines() or ["failed"])[-1]
 

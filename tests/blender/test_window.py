@@ -19,7 +19,7 @@ import bpy
 
 sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parent.parent)]
 
-PATIENCE = 120.0  # s of a wait, after which nothing comes any more, on a machine that others load too
+PATIENCE = 120.0  # s of a wait without progress of an analysis, on a machine that others load too
 ALONE = {"newcomers_clicks"}  # run by their names only: they want Blender as it comes, and not as other tests left its window
 # Of the library, files and processes, which are the same under each Blender; or too long for its software graphics: EEVEE of 5.2 compiles
 # shaders for minutes.
@@ -43,6 +43,12 @@ def work():
     """Processor seconds of this process."""
     times = os.times()
     return times.user + times.system
+
+
+def progress():
+    """Progress of the analyses that run beside the viewport. It changes while they work."""
+    from patina.sync.analyzing import ANALYSES
+    return [job.progress.value() for job in ANALYSES._jobs.values()]
 
 
 def tests():
@@ -117,7 +123,9 @@ class Runner:
         try:
             if self.condition is None or self.condition():
                 self.condition = next(self.steps)
-                self.asked = time.perf_counter()
+                self.asked, self.progress = time.perf_counter(), progress()
+            elif self.progress != (now := progress()):
+                self.asked, self.progress = time.perf_counter(), now
             elif time.perf_counter() - self.asked > PATIENCE:
                 from patina import viewport
                 said = [found.message for found in viewport._VIEWPORTS]
