@@ -57,9 +57,9 @@ def import_points(path):
 
 
 def finite_points(obj):
-    flat = np.empty(len(obj.data.vertices) * 3, np.float32)
-    obj.data.vertices.foreach_get("co", flat)
-    points = flat.reshape(-1, 3).astype(np.float64)
+    from patina import point_data
+    from patina.sync import attributes
+    points = attributes.positions(obj.data, point_data.count_of(obj.data)).astype(np.float64)
     return points[np.isfinite(points).all(axis=1)] + np.array(obj.location)
 
 
@@ -142,7 +142,7 @@ def main(folder):
     else:
         render_styles(scene, target)
     rendered = time.perf_counter()
-    print(f"Blender {bpy.app.version_string}: {len(obj.data.vertices):,} points imported in "
+    print(f"Blender {bpy.app.version_string}: {len(finite_points(obj)):,} points imported in "
           f"{imported - start:.2f} s, rendered and saved in {rendered - imported:.2f} s: {target}", flush=True)
 
 

@@ -49,9 +49,10 @@ def stage():
 
 def aim(scene, obj, azimuth, elevation, keep, at=(0.5, 0.5, 0.5)):
     """A camera that looks at a place in parts of the points' box, from so far that `keep` of its diagonal fills the picture's height."""
-    flat = np.empty(len(obj.data.vertices) * 3, np.float32)
-    obj.data.vertices.foreach_get("co", flat)
-    low, high = np.percentile(flat.reshape(-1, 3).astype(np.float64), (1.0, 99.0), axis=0)
+    from patina import point_data
+    from patina.sync import attributes
+    places = attributes.positions(obj.data, point_data.count_of(obj.data))
+    low, high = np.percentile(places.astype(np.float64), (1.0, 99.0), axis=0)
     data = bpy.data.cameras.new("camera")
     camera = bpy.data.objects.new("camera", data)
     camera.rotation_euler = Euler((radians(90 - elevation), 0, radians(azimuth)))
