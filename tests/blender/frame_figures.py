@@ -12,7 +12,7 @@ programs disturb the clock more. Whole redraws are measured by the clock too. Th
 import json
 import os
 import time
-from statistics import median, mode
+from statistics import median
 
 import harness
 from figures import ball, finish_drawing, orbit
@@ -85,22 +85,10 @@ def frame_figures():
 def measured(figures, name, count):
     """Adds to the figures, with overlays hidden or shown."""
     found = shown()
-    levels, works, pictures = [], [], found.pictures
-    draw = viewport.Viewport._draw_picture
-
-    def noted(self, context):
-        if self.shown.wish.level != viewport.pace.FULL:
-            levels.append(self.shown.wish.level)
-            works.append(self.shown.stats["ms"])
-        draw(self, context)
-
-    viewport.Viewport._draw_picture = noted
+    pictures = found.pictures
     whole = yield from orbited(SECONDS)
-    viewport.Viewport._draw_picture = draw
     yield lambda: settled(count)
-    level = mode(levels) if levels else viewport.pace.FULL
-    figures[name] = {"whole_ms": whole["ms"], "whole_clock_ms": whole["clock_ms"], "redraws": whole["redraws"], "pictures": found.pictures - pictures,
-                     "picture_ms": median(works) if works else 0.0, "strata": level.strata, "shrink": level.shrink}
+    figures[name] = {"whole_ms": whole["ms"], "whole_clock_ms": whole["clock_ms"], "redraws": whole["redraws"], "pictures": found.pictures - pictures}
 
     # no new image: the last one is uploaded and drawn each time
     ask, viewport.Viewport._ask = viewport.Viewport._ask, lambda self, level, detail=0.0: None
