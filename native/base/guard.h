@@ -8,7 +8,8 @@
 // that the host installed before. Reading into owned pages instead would copy every byte, and the memory could not be given back to the
 // system's cache of files.
 //
-// platform_posix.c and platform_windows.c install the handler.
+// platform_posix.c and platform_windows.c install the handler. macOS was checked by reading alone: its kernel reports a page that it cannot
+// read as SIGBUS with the address and a positive si_code, and mmap with MAP_FIXED may replace pages (of 16 KB on Apple's processors).
 #ifndef PT_GUARD_H
 #define PT_GUARD_H
 

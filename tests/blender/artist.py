@@ -43,6 +43,7 @@ class Artist:
     def __init__(self, seed):
         self.chance, self.scene, self.saved = random.Random(seed), None, str(SCRATCH / "artist.blend")
         self.scans = [dense(f"artist-{i}.ply", POINTS, (0, 0, 0)) for i in range(2)]
+        bpy.context.preferences.filepaths.use_auto_save_temporary_files = False  # Blender's own file, two minutes after the last load
 
     def clouds(self):
         return [obj for obj in bpy.context.view_layer.objects if point_data.is_cloud(obj)]
