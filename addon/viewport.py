@@ -605,7 +605,9 @@ class Viewport:
                 return found
             finally:
                 self._rendering = None
-                ANALYSES.end_frame(task)
+                if not task.done():
+                    frame.cancel()
+                ANALYSES.end_frame(task, close=True)  # before its scene, and before an analysis may change the clouds
 
 
 _VIEWPORTS: set[Viewport] = set()

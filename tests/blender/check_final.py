@@ -10,9 +10,10 @@ from check_passes import dense_scene
 from check_points import pixel
 from harness import add_points, check, check_close, check_soon, new_scene, patina, render, set_world, sphere, stats, written
 from mathutils import Matrix, Vector
-from patina import engine, jobs, memory, native, options
+from patina import engine, jobs, memory, native, options, viewport
 from patina import render as drawing
 from patina.sync import attributes, clouds
+from patina.sync.analyzing import ANALYSES
 
 
 def test_position():
@@ -224,6 +225,20 @@ def test_options():
     finally:
         sys.argv = before
         drawing.forget_device()
+
+
+def test_a_viewport_gives_its_picture_up():
+    """Its steps end while the library draws: the picture has ended, too, before its scene goes and an analysis may change the clouds."""
+    scene = dense_scene(3000, 3000)
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    description = engine.sync.describe(depsgraph, engine.sync.final_view(scene.camera, depsgraph), lambda what, progress: False)
+    with native.Frame(drawing.device_for(description.device)) as frame:
+        steps = viewport.Viewport.__new__(viewport.Viewport)._draw_frame(frame, description, ("COMBINED",), [])
+        task = next(steps)
+        check(task in ANALYSES._frames and not task.done(), "it draws")
+        steps.close()
+        check(task.done() and not ANALYSES._frames, "it still draws")
 
 
 def test_cancel_is_soon():
