@@ -81,7 +81,7 @@ def _table(points: int, found: dict[str, list[dict]]) -> str:
     """Medians. found: what the sessions of each Blender measured."""
     some, times = next(iter(found.values()))[0], sorted({len(sessions) for sessions in found.values()})
     rounds = " to ".join(str(count) for count in dict.fromkeys((times[0], times[-1])))
-    rows = [f"| {points:,} points, {some['width']} × {some['height']}, ms, medians of {rounds}; overlays | | " + " | ".join(found) + " |",
+    rows = [f"| {points:,} points, {some['width']} × {some['height']}, ms, medians of {rounds} sessions; overlays | | " + " | ".join(found) + " |",
             "|---|---|" + "---|" * len(found)]
     for overlays in ("hidden", "shown"):
         rows += [f"| {overlays} | {label} | " + " | ".join(f"{median(got[overlays][key] for got in sessions):.1f}" for sessions in found.values()) + " |"
