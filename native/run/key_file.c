@@ -143,9 +143,9 @@ static int read_head(struct pt_key_file *file, const struct pt_handle *handle)
     if (head->version != PT_KEYS_VERSION)
         return pt_fail(handle, PATINA_ERROR_FORMAT, "%s: keys of version %u; this is for version %d: scatter anew", file->path,
                        head->version, PT_KEYS_VERSION);
-    head->engine[sizeof head->engine - 1] = 0;
-    if (head->check != check_of(head))
+    if (head->check != check_of(head)) // as it was read, so before anything in it is cut
         return refuse(file, handle, "damaged: the check sum of its head is wrong");
+    head->engine[sizeof head->engine - 1] = 0;
     if (head->size != file->disk.size)
         return pt_fail(handle, PATINA_ERROR_FORMAT, "%s: damaged: it has %llu of %llu bytes", file->path,
                        (unsigned long long)file->disk.size, (unsigned long long)head->size);
