@@ -30,7 +30,9 @@ static inline void fuzz_read_columns(const patina_file *file, const patina_file_
         patina_file_attribute attribute = {.struct_size = sizeof attribute};
         REQUIRE(patina_file_get_attribute(file, i, &attribute) == PATINA_OK);
         REQUIRE(patina_file_read_attribute(file, i, floats, count * sizeof *floats) == PATINA_OK);
-        for (size_t k = 0; info->stations && !strcmp(attribute.name, "scan") && k < count; k++)
+        // a PLY may have points of no scan, with any other number; the other readers number their scans
+        const int numbered = info->stations && strncmp(info->format, "PLY", 3) != 0 && !strcmp(attribute.name, "scan");
+        for (size_t k = 0; numbered && k < count; k++)
             REQUIRE(floats[k] < (float)info->stations);
     }
     REQUIRE((patina_file_read_stations(file, stations, (info->stations + 1) * 3 * sizeof *stations) == PATINA_OK) ==
