@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Written by tests/truth/trust/train.py on 2026-11-28; trust_model.c reads it. Do not edit: train again.
-// Sum: 62cafdd63c353f49 of what it was made from
+// Sum: 9abba326b66d1d3a of what it was made from
 // Scenes:
 //   hall, ruin, railings, lattice, trench, machines, street-errors, room-errors, trees-errors, columns-errors
 // Features:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far trust carries: tables per scene and per cause, and the reliability curve.
 
-    build/out/venv/bin/python tests/truth/trust/report.py FOLDER [--scenes unseen] [--trees 100]
+    build/out/venv/bin/python tests/truth/trust/report.py FOLDER [--scenes unseen] [--trees 100 | --in-force]
 
-Trains on the scenes for training and judges others, held out ones by default. FOLDER: as train.py's. As a module: tables() of given
+Trains on the scenes for training and judges others, held out ones by default. --in-force: judges with the constants that the library is
+built with. FOLDER: as train.py's. As a module: tables() of given
 scores."""
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from truth.trust import boost, samples  # noqa: E402
+from truth.trust import boost, constants, samples  # noqa: E402
 
 LOSSES = (0.01, 0.003)  # of the right samples
 STEPS = (0, 2, 4, 6, 8, 10, 11, 12, 13, 14, 15, 16)  # of levels, for the reliability curve
@@ -96,8 +97,14 @@ def main() -> int:
     parser.add_argument("folder", help="of features, or plain")
     parser.add_argument("--scenes", default="unseen")
     parser.add_argument("--trees", type=int, default=train.TREES)
+    parser.add_argument("--in-force", action="store_true")
     options = parser.parse_args()
     folder, names = None if options.folder == "plain" else Path(options.folder), train.names_of_features(options.folder)
+    if options.in_force:
+        model = constants.read(train.CONSTANTS.read_text())
+        others = samples.load_all([one.name for one in campaigns.group(options.scenes)], folder, len(names))
+        print(tables(others, {name: model.judged(one.values) for name, one in others.items()}, model.calibration, model.limit))
+        return 0
     known = samples.load_all(samples.checked([one.name for one in campaigns.group("trained")]), folder, len(names))
     forest, calibration, limit, _ = train.model(known, options.trees)
     others = samples.load_all([one.name for one in campaigns.group(options.scenes)], folder, len(names))

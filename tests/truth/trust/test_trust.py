@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -16,7 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from truth.scans import campaigns  # noqa: E402
-from truth.trust import boost, features, report, samples, train  # noqa: E402
+from truth.trust import boost, constants, features, report, samples, train  # noqa: E402
 
 JUDGE = """#include <stdint.h>
 struct node { float most; int16_t value; uint16_t feature; };
@@ -107,9 +108,9 @@ class Written(unittest.TestCase):
         calibration = boost.calibrate(score, right, np.ones(len(right)))
         calibration.after, calibration.sure = 5, 700
         names = ["a", "b", "c", "d", "e"]
-        text = train.as_c(forest, calibration, 13, names, ["hall"], "2026-01-01")
+        text = train.as_c(forest, calibration, 13, names, ["hall"], "2026-01-01", "abc1")
         second = boost.train(values.copy(), right.copy(), one, 20)
-        self.assertEqual(text, train.as_c(second, calibration, 13, names, ["hall"], "2026-01-01"))
+        self.assertEqual(text, train.as_c(second, calibration, 13, names, ["hall"], "2026-01-01", "abc1"))
         self.assertEqual(train.told(text), (train.made_from(names, ["hall"]), "2026-01-01", names, ["hall"]))
         self.assertNotEqual(train.made_from(names, ["hall"]), train.made_from(names, ["ruin"]))
         self.assertNotEqual(train.made_from(names, ["hall"]), train.made_from(names[1:], ["hall"]))
@@ -129,6 +130,38 @@ class Written(unittest.TestCase):
         np.testing.assert_array_equal(got, score)
         np.testing.assert_array_equal(early, forest.score(bins, 5))
         self.assertLess(train.size_of(forest), train.MOST_BYTES)
+        model = constants.read(text)  # the same, read back
+        np.testing.assert_array_equal(model.score(values), score)
+        np.testing.assert_array_equal(model.score(values, 5), early)
+        self.assertEqual((model.calibration.least.tolist(), model.calibration.after, model.calibration.sure, model.limit),
+                         (calibration.least.tolist(), 5, 700, 13))
+        self.assertEqual(train.features_of(text), "abc1")
+
+    def test_check_notices_other_features(self) -> None:
+        """A file with today's sum passes; one with another sum, with none, or of other scenes does not."""
+        native = constants.library()
+        if native is None:
+            print("skip test_check_notices_other_features: no library")
+            self.skipTest("no library")
+        text = re.sub(r"^// Features' sum: .*\n", "", train.CONSTANTS.read_text(), flags=re.M)
+        self.assertIn("was not written", train.complaint(text))
+        now, head = constants.sum_of_features(native), "// Features:"
+        self.assertEqual(train.complaint(text.replace(head, f"// Features' sum: {now}\n{head}")), "")
+        self.assertIn("other features", train.complaint(text.replace(head, f"// Features' sum: {now[::-1]}x\n{head}")))
+        self.assertIn("other scenes", train.complaint(re.sub("// Sum: ....", "// Sum: 0000", text)))
+
+    def test_levels_in_force_are_those_of_the_library(self) -> None:
+        native = constants.library()
+        if native is None:
+            print("skip test_levels_in_force_are_those_of_the_library: no library")
+            self.skipTest("no library")
+        position, _ = constants.fixed_cloud()
+        cloud = native.Cloud(position, None, None)
+        values = np.zeros((len(position), native.abi.TRUST_FEATURES), np.float32)
+        cloud.analyse(trust_features=values)
+        levels = constants.read(train.CONSTANTS.read_text()).level(values)
+        self.assertEqual(np.bincount(levels, minlength=boost.LEVELS).tolist(), list(cloud.trusts))
+        self.assertGreater(len(set(levels)), 8)
 
     def test_constants_are_of_today(self) -> None:
         """What the library was built with was made from today's scenes, scanners and trainer."""

@@ -10,8 +10,8 @@ native/scene/trust_model.c reads it. Scenes that split.json holds out are refuse
 calibration and the default threshold come from trees that were trained on other scenes than they are judged on. The same input gives
 the same bytes.
 
---check: whether the file was made from today's scenes, scanners and trainer, by the sum in its head (a second); with a folder also
-whether training again gives its bytes (minutes)."""
+--check: whether the file was made from today's scenes, scanners and trainer, and from the features that the library computes today, by
+the sums in its head (a second); with a folder also whether training again gives its bytes (minutes)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from truth.scans import campaigns, exact  # noqa: E402
 from truth.scans.scanner import CAUSES  # noqa: E402
-from truth.trust import boost, features, report, samples  # noqa: E402
+from truth.trust import boost, constants, features, report, samples  # noqa: E402
 
 CONSTANTS = ROOT / "native/scene/trust_constants.h"
 FEATURES = ROOT / "native/scene/trust_features.h"
@@ -60,6 +60,24 @@ def told(text: str) -> tuple[str, str, list[str], list[str]]:
         raise ValueError("no file that train.py wrote")
     words = [re.findall(r"[\w-]+", one[1].replace("//", "")) for one in lists]
     return sum_[1], date[1], words[0], words[1]
+
+
+def features_of(text: str) -> str:
+    """The sum over features that a written file was trained on; "": it does not say."""
+    found = re.search(r"^// Features' sum: (\w+)", text, re.M)
+    return found[1] if found else ""
+
+
+def complaint(text: str) -> str:
+    """What a written file was made from that is different today; "": nothing."""
+    sum_, _, names, scenes = told(text)
+    if sum_ != made_from(names, samples.checked(scenes)):
+        return "was made from other scenes, scanners or trainer"
+    native = constants.library()
+    if native is None:
+        return "may be of other features: there is no library to compute them"
+    was, now = features_of(text), constants.sum_of_features(native)
+    return "" if was == now else f"was made from other features: their sum was {was or 'not written'} and is {now}"
 
 
 def joined(all_: dict[str, samples.Samples], names: list[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -120,14 +138,16 @@ def names_of_features(folder: str) -> list[str]:
     return list(features.NAMES) if folder == "plain" else re.findall(r"X\((\w+), \"", FEATURES.read_text())
 
 
-def as_c(forest: boost.Forest, calibration: boost.Calibration, limit: int, names: list[str], scenes: list[str], date: str) -> str:
+def as_c(forest: boost.Forest, calibration: boost.Calibration, limit: int, names: list[str], scenes: list[str], date: str,
+         features_sum: str) -> str:
     trees = [forest.nodes(k) for k in range(len(forest.leaf))]
     nodes = [node for tree in trees for node in tree]
     roots = np.cumsum([0] + [len(tree) for tree in trees[:-1]])
     curve = ", ".join(f"{score} = {0.5 * (a + b):.3f}" for score, a, b in zip(calibration.least, boost.TRUST, boost.TRUST[1:]))
     head = ["// SPDX-License-Identifier: GPL-3.0-or-later",
             f"// Written by tests/truth/trust/train.py on {date}; trust_model.c reads it. Do not edit: train again.",
-            f"// Sum: {made_from(names, scenes)} of what it was made from"]
+            f"// Sum: {made_from(names, scenes)} of what it was made from",
+            f"// Features' sum: {features_sum}"]
     for title, words in (("Scenes", ", ".join(scenes)), ("Features", ", ".join(names)),
                          ("Calibration, score = share that is right", curve)):
         head += [f"// {title}:", *("//   " + line for line in _wrapped(words, 120))]
@@ -179,9 +199,9 @@ def main() -> int:
     options = parser.parse_args()
     scenes = samples.checked([one.name for one in campaigns.group(options.scenes)])
     if options.check:
-        sum_, options.date, names, scenes = told(options.out.read_text())
-        if sum_ != made_from(names, samples.checked(scenes)):
-            print(f"{options.out} was made from other scenes, scanners or trainer. Run tests/truth/trust/train.py.", file=sys.stderr)
+        _, options.date, _, scenes = told(options.out.read_text())
+        if problem := complaint(options.out.read_text()):
+            print(f"{options.out} {problem}. Run tests/truth/trust/train.py.", file=sys.stderr)
             return 1
     if not options.folder:
         return 0 if options.check else parser.error("which folder has the features?")
@@ -191,7 +211,9 @@ def main() -> int:
     if size_of(forest) > MOST_BYTES:
         print(f"The model needs {size_of(forest)} bytes; {MOST_BYTES} are allowed. Train fewer trees.", file=sys.stderr)
         return 1
-    text = as_c(forest, calibration, limit, names, scenes, options.date)
+    native = None if options.folder == "plain" else constants.library()
+    features_sum = constants.sum_of_features(native) if native else "plain"
+    text = as_c(forest, calibration, limit, names, scenes, options.date, features_sum)
     if options.check:
         same = text == options.out.read_text()
         print(f"{options.out}: training again gives {'the same' if same else 'other'} bytes")
