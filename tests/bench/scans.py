@@ -2,10 +2,11 @@
 """Virtual scans against exact views: our own settings, and VTK's points of 1 to 7 pixels, alike.
 
     build/out/venv/bin/python tests/bench/scans.py [--scenes tuning|held|all|trained|unseen|campaigns|NAMES] [--cameras 0,1,…] [--modes MODE,…]
-        [--json FILE] [--add FILE]... [--readme]
+        [--still] [--by-scene] [--json FILE] [--add FILE]... [--readme]
 
 MODE: default, stations (the scanners' places are known), free (and what they saw through is left out), grid (and neighbours
-in their grids tell where surfaces end), filling, discs, ranges (ours);
+in their grids tell where surfaces end), all (untrusted points too), sor, noise (all points that one of CloudCompare's filters keeps),
+filling, discs, ranges (ours);
 vtk 1, vtk 3 EDL, … (points of so many pixels); cycles 0.02, eevee 0.02, … (spheres of a radius in metres; EEVEE takes
 minutes a picture on llvmpipe). The default
 is all but eevee. --add: rows of earlier runs, whose modes are not measured again; --readme: the table of figures."""
@@ -37,8 +38,9 @@ from truth.scans.scenes import FOV, HEIGHT, SKY, STEP, WIDTH, Scene  # noqa: E40
 from truth.scans.solids import linear  # noqa: E402
 
 PYTHON = "/usr/bin/python3"  # Debian's, for its VTK
-OURS = {"default": ("on", []), "stations": ("stations", []), "free": ("free", []), "grid": ("grid", []), "filling": ("off", []), "discs": ("off", ["surface=1"]),
-        "ranges": ("off", ["surface=3"])}
+OURS = {"default": ("on", []), "stations": ("stations", []), "free": ("free", []), "grid": ("grid", []), "all": ("on", []),
+        "sor": ("on", []), "noise": ("on", []), "filling": ("off", []), "discs": ("off", ["surface=1"]), "ranges": ("off", ["surface=3"])}
+UNTRUSTED = ("all", "sor", "noise")  # untrusted points are drawn
 CYCLES = ("cycles 0.01", "cycles 0.02", "cycles 0.04")
 VTK = ("vtk 1", "vtk 3", "vtk 5", "vtk 7", "vtk 5 EDL")
 NEAR, FAR = 0.05, 500.0
@@ -70,12 +72,12 @@ def peer_command(program: str) -> list[str]:
     return [*(_screen() if program == "eevee" else []), str(python), str(HERE / "peer_scans_blender.py")]
 
 
-def peer_rows(scenes: list[Scene], cameras: list[int], program: str, sizes: list[str]) -> Iterator[dict[str, Any]]:
+def peer_rows(scenes: list[Scene], cameras: list[int], program: str, sizes: list[str], motion: bool = True) -> Iterator[dict[str, Any]]:
     """Rows as run.measure gives them, with "mode". sizes: pixels of VTK's points, metres of Blender's radii."""
     command = peer_command(program)
     for scene in scenes if command else ():
         stage = Stage(scene)
-        views = [(index, 0.0) for index in cameras] + [(index, STEP) for index in cameras if scene.views[index].motion]
+        views = [(index, 0.0) for index in cameras] + [(index, STEP) for index in cameras if motion and scene.views[index].motion]
         with tempfile.TemporaryDirectory() as folder:
             source = Path(folder) / "scan.npz"
             np.savez(source, position=stage.scan.position.astype(np.float32), color=stage.scan.color,
@@ -97,18 +99,19 @@ def peer_rows(scenes: list[Scene], cameras: list[int], program: str, sizes: list
                 for number, index in enumerate(cameras):
                     row = {"scene": scene.name, "held_out": scene.held_out, "camera": index, "points": len(stage.scan),
                            "mode": f"{program} {size}", **metrics.measure(stage.view(index), *pictures[number]),
-                           "ms": times[size][number]}
-                    if scene.views[index].motion:
+                           "ms": times[size][number], "work": times.get(f"{size} work", [np.nan] * len(views))[number]}
+                    if motion and scene.views[index].motion:
                         moved = pictures[views.index((index, STEP))][0]
                         row["flicker"] = metrics.flicker((stage.view(index), stage.view(index, True)),
                                                          (pictures[number][0], moved))
                     yield row
 
 
-def our_rows(scenes: list[Scene], cameras: list[int], mode: str) -> list[dict[str, Any]]:
+def our_rows(scenes: list[Scene], cameras: list[int], mode: str, motion: bool = True) -> list[dict[str, Any]]:
     analysis, settings = OURS[mode]
-    options = argparse.Namespace(device="cpu", threads=0, analysis=analysis, set=settings, style=[], effect=[], hook=None)
-    rows = run.measure(run.Drawer(options), scenes, cameras)
+    options = argparse.Namespace(device="cpu", threads=0, analysis=analysis, set=settings, effect=[], hook=None,
+                                 style=["least_trust=-1.0"] if mode in UNTRUSTED else [], filter=mode)
+    rows = run.measure(run.Drawer(options), scenes, cameras, motion=motion)
     return [{**row, "mode": mode} for row in rows]
 
 
@@ -130,7 +133,24 @@ def markdown(rows: list[dict[str, Any]]) -> str:
     return table(head, body)
 
 
-NAMES = {"default": "Patina", "stations": "Patina, scanners known", "free": "Patina, free space used",
+def by_scene(rows: list[dict[str, Any]]) -> str:
+    """A line a scene and way: Patina, the size of VTK's points with the best PSNR and the one with the least false and lost, and what
+    CloudCompare's filters leave. work: milliseconds of the processor."""
+    body = []
+    for name in dict.fromkeys(row["scene"] for row in rows):
+        found = {mode: run.mean([row for row in rows if row["scene"] == name and row["mode"] == mode])
+                 for mode in dict.fromkeys(row["mode"] for row in rows if row["scene"] == name)}
+        sizes = [mode for mode in found if mode.startswith("vtk") and "EDL" not in mode]
+        best = {max(sizes, key=lambda mode: found[mode]["psnr"]): "best PSNR",
+                min(sizes, key=lambda mode: found[mode]["false"] + found[mode]["lost"]): "least false + lost"} if sizes else {}
+        for mode in [mode for mode in found if mode not in sizes] + list(best):
+            values = found[mode]
+            body.append([name, name_of(mode) + (f" ({best[mode]})" if mode in best else ""), f"{values['psnr']:.1f}",
+                         *(f"{100 * values[column]:.1f}" for column in ("false", "lost", "sky")), f"{values['work']:.0f}"])
+    return table(["scene", "drawn by", "PSNR", "false %", "lost %", "sky %", "work, ms"], body)
+
+
+NAMES = {"default": "Patina", "all": "Patina, all points", "sor": "SOR filter, then Patina", "noise": "noise filter, then Patina", "stations": "Patina, scanners known", "free": "Patina, free space used",
          "grid": "Patina, scanners' grids used",
          "filling": "Patina, filling alone",
          "discs": "Patina, discs of 1.75 spacings", "ranges": "Patina, range images"}
@@ -143,14 +163,14 @@ def name_of(mode: str) -> str:
     return NAMES.get(mode) or told[program].replace(" EDL px", " px + EDL")
 
 
-def all_rows(scenes: list[Scene], cameras: list[int], modes: list[str]) -> list[dict[str, Any]]:
+def all_rows(scenes: list[Scene], cameras: list[int], modes: list[str], motion: bool = True) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for mode in modes:
         if mode in OURS:
-            rows += our_rows(scenes, cameras, mode)
+            rows += our_rows(scenes, cameras, mode, motion)
     for program in ("vtk", "cycles", "eevee"):
         sizes = [mode.removeprefix(program + " ") for mode in modes if mode.startswith(program)]
-        rows += peer_rows(scenes, cameras, program, sizes) if sizes else []
+        rows += peer_rows(scenes, cameras, program, sizes, motion) if sizes else []
     return rows
 
 
@@ -166,13 +186,15 @@ def main() -> int:
     parser.add_argument("--scenes", default="all")
     parser.add_argument("--cameras", default="0,1,2,3,4,5,6,7")
     parser.add_argument("--modes", default=",".join(SHOWN))
+    parser.add_argument("--still", action="store_true", help="no flicker")
+    parser.add_argument("--by-scene", action="store_true", help="a table by scene: Patina, VTK's best size, CloudCompare's filters")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--add", type=Path, action="append", default=[])
     parser.add_argument("--readme", action="store_true")
     options = parser.parse_args()
     kept = [row for path in options.add for row in json.loads(path.read_text())]
     modes = [mode for mode in options.modes.split(",") if mode and mode not in {row["mode"] for row in kept}]
-    rows = all_rows(run.scenes_of(options.scenes), [int(one) for one in options.cameras.split(",")], modes)
+    rows = all_rows(run.scenes_of(options.scenes), [int(one) for one in options.cameras.split(",")], modes, not options.still)
     order = {mode: number for number, mode in enumerate((*OURS, *VTK, *CYCLES))}
     rows = sorted(rows + kept, key=lambda row: order.get(row["mode"], len(order)))
     if options.readme:
@@ -180,7 +202,7 @@ def main() -> int:
         import readme
         print(readme.update({"scans": rows, "rows": [], "details": [], "parts": {}, "processor": machine.processor(),
                              "cores": machine.cores(), "date": datetime.date.today().isoformat()}, ROOT))
-    print(markdown(rows))
+    print(by_scene(rows) if options.by_scene else markdown(rows))
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1))
     return 0

@@ -31,6 +31,7 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "addon")]
 from truth.scans import metrics  # noqa: E402
 from truth.scans.campaigns import group, named  # noqa: E402
 from truth.scans.exact import Exact, Stage, camera  # noqa: E402
+from truth.scans.filters import FILTERS  # noqa: E402
 from truth.scans.scenes import HEIGHT, SKY, STEP, WIDTH, Scene  # noqa: E402
 from truth.scans.solids import linear  # noqa: E402
 
@@ -52,15 +53,17 @@ class Drawer:
         self.settings, self.style, self.effects = (_fields(given) for given in (options.set, options.style, options.effect))
         self.hook = _hook(options.hook)
         self.analysis = options.analysis
+        self.filter = FILTERS.get(getattr(options, "filter", None) or "")
 
     def cloud(self, stage: Stage) -> Any:
         make = getattr(self.hook, "cloud", None)
         scan = stage.scan
+        kept = self.filter(scan.position) if self.filter else slice(None)
         made = make(self.native, scan, stage.scene) if make else \
-            self.native.Cloud(np.ascontiguousarray(scan.position, np.float32), None, np.ascontiguousarray(scan.color))
+            self.native.Cloud(np.ascontiguousarray(scan.position[kept], np.float32), None, np.ascontiguousarray(scan.color[kept]))
         if self.analysis != "off" and hasattr(made, "analyse") and not make:
             # samples of a walk have no station
-            known = self.analysis in ("stations", "free", "grid") and len(scan.stations) > int(scan.scan.max())
+            known = self.analysis in ("stations", "free", "grid") and not self.filter and len(scan.stations) > int(scan.scan.max())
             by_grid = known and self.analysis == "grid"
             made.analyse(stations=scan.stations if known else None,
                          station=scan.scan.astype(np.uint8)[:, None] if known else None,
@@ -205,6 +208,7 @@ def main() -> int:
     parser.add_argument("--analysis", choices=("off", "on", "stations", "free", "grid"), default="on",
                         help="what every point knows, where the library finds it out; with the scanners' places; without what they "
                         "saw through; and with neighbours in their grids")
+    parser.add_argument("--filter", choices=list(FILTERS), help="draw only the points that one of CloudCompare's filters keeps; without stations")
     parser.add_argument("--times", type=int, default=1, help="timed frames a camera; the least counts")
     parser.add_argument("--still", action="store_true", help="no flicker")
     parser.add_argument("--pictures", type=Path, help="truth, picture, errors and ceiling of each camera go here as PNG")

@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from truth.scans import exact, metrics, scanner  # noqa: E402
+from truth.scans import exact, filters, metrics, scanner  # noqa: E402
 from truth.scans import scenes as frozen  # noqa: E402
 from truth.scans.campaign import Campaign, Instrument, Station  # noqa: E402
 from truth.scans.scenes import Scene, Survey, View  # noqa: E402
@@ -269,6 +269,27 @@ class Seen(unittest.TestCase):
                           nowhere, nowhere, everywhere, black.astype(np.uint8))
         self.assertAlmostEqual(metrics.measure(one, black, drawn)["outline"], 3.0, places=6)
         self.assertEqual(metrics.measure(one, black, truth)["outline"], 0.0)
+
+
+class Filtered(unittest.TestCase):
+    def test_against_loops(self) -> None:
+        """CloudCompare's filters against plain loops over a rough wall with strays, and what coincides or is too little."""
+        random = np.random.default_rng(3)
+        wall = np.concatenate([random.uniform(0, 1, (400, 3)) * (1, 1, 0.01), random.uniform(0, 1, (12, 3)) * (1, 1, 1) + (0, 0, 0.2)])
+        away = np.linalg.norm(wall[:, None] - wall, axis=2)
+        near = np.argsort(away, axis=1)[:, 1:7]
+        mean = np.take_along_axis(away, near, 1).mean(axis=1)
+        np.testing.assert_array_equal(filters.sor(wall), mean <= mean.mean() + mean.std())
+        self.assertFalse(filters.sor(wall)[400:].any())
+        flat = []
+        for point, which in zip(wall, near):
+            middle = wall[which].mean(axis=0)
+            normal = np.linalg.svd(wall[which] - middle)[2][2]
+            flat.append(abs((point - middle) @ normal) <= np.sqrt((((wall[which] - middle) @ normal) ** 2).mean()))
+        np.testing.assert_array_equal(filters.noise(wall), flat)
+        self.assertTrue(0.3 < np.mean(flat) < 0.9)
+        self.assertTrue(filters.sor(np.zeros((9, 3))).all() and filters.sor(np.zeros((1, 3))).all())
+        self.assertTrue(filters.noise(np.zeros((9, 3))).all() and not filters.noise(np.eye(3)).any())
 
 
 class Frozen(unittest.TestCase):
