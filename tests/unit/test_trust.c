@@ -158,7 +158,13 @@ static void test_default_level(void **state)
     uint64_t counts[PT_TRUST_LEVELS] = {[15] = 100000};
     assert_int_equal(pt_level_of_trust((double)PATINA_TRUST_DEFAULT), 6);
     assert_int_equal(pt_level_of_trust((double)PATINA_TRUST_MOST), 9);
+    assert_int_equal(pt_default_level(counts), 6); // a clean cloud keeps its points
+    counts[8] = 900;
+    counts[5] = 50; // 0.0495 % of all are below 6
+    assert_int_equal(pt_default_level(counts), 6);
+    counts[5] = 51; // 0.0505 %
     assert_int_equal(pt_default_level(counts), 9);
+    counts[8] = 0;
     counts[7] = 1300; // 0.72 of these are right: 0.9 % of all that are
     assert_int_equal(pt_default_level(counts), 9);
     counts[7] = 1500; // 1.1 %
@@ -168,7 +174,7 @@ static void test_default_level(void **state)
     counts[2] = 50000; // below the least threshold in any case
     assert_int_equal(pt_default_level(counts), 6);
     memset(counts, 0, sizeof counts);
-    assert_int_equal(pt_default_level(counts), 9);
+    assert_int_equal(pt_default_level(counts), 6);
 }
 
 static void test_strays_vanish(void **state)

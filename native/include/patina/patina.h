@@ -246,8 +246,8 @@ enum patina_kind {
 
 // Numbers of patina_analysis_desc.trust_features: scene/trust_features.h lists them.
 #define PATINA_TRUST_FEATURES 33
-// By default points of less trust are not drawn: at most 1 % of the right samples of any scene for tuning have less. Of each cloud the
-// default is raised, to PATINA_TRUST_MOST at most, while no more than 1 % of its points that are probably right have less.
+// By default points of less trust are not drawn: at most 1 % of the right samples of any scene for tuning have less. Where 0.05 % of a cloud's
+// points have less, its default is raised, to PATINA_TRUST_MOST at most, while at most 1 % of those that are probably right have less.
 #define PATINA_TRUST_DEFAULT 0.64f
 #define PATINA_TRUST_MOST 0.84f
 
