@@ -101,7 +101,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     except OSError as error:
         raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror}", -3) from None
     words, at = _header(path, data[:1 << 20])
-    kind, count, form = _columns(path, words), _count(path, words), words["DATA"][0]
+    kind, count, form = _columns(path, words), _count(path, words), " ".join(words["DATA"][:1]) or "of no kind"
     if form == "ascii":
         table, held = yield from _ascii(path, data[at:], kind, count, progress)
     elif form == "binary":
