@@ -126,7 +126,7 @@ class _Parser:
                 parser.Parse(b"", True)
         except expat.ExpatError as error:
             raise E57Error(f"its XML is damaged: {error}") from None
-        except (ValueError, OverflowError) as error:
+        except (ValueError, OverflowError, LookupError) as error:  # the last: of an encoding that nobody knows
             raise E57Error(f"its XML is damaged: {error}") from None
 
     def _no_types(self, *_: object) -> None:
