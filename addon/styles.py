@@ -31,7 +31,7 @@ import stat
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import degrees, isfinite
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -193,7 +193,7 @@ def read(path: Path) -> Style:
     unknown += [f"view.{key}" for key in view]
     unknown = [_shown(key)[1:-1] for key in unknown]
     return Style(_text(found.get("name")) or bpy.path.display_name(path.stem), _text(found.get("about"), 2000), values["scene"],
-                 values["points"], transform, tuple(unknown))
+                 values["points"], _text(transform), tuple(unknown))
 
 
 def _section(path: Path, found: dict[str, Any], name: str) -> dict[str, Any]:
@@ -275,8 +275,8 @@ def _number(kind: bpy.types.Property, raw: Any) -> float | int:
     turn = degrees(1.0) if kind.subtype == 'ANGLE' else 1.0
     low, high = kind.hard_min * turn, kind.hard_max * turn
     whole = kind.type == 'INT'
-    if isinstance(raw, bool) or not isinstance(raw, int if whole else (int, float)) or not isfinite(raw) or \
-            not low - 1e-5 <= raw <= high + 1e-5:
+    if isinstance(raw, bool) or not isinstance(raw, int if whole else (int, float)) or \
+            not low - 1e-5 <= raw <= high + 1e-5:  # NaN, too
         ends = f" from {low:g}" + (f" to {high:g}" if high < 2**31 - 1 else " on") if low > -2**31 else ""
         raise ValueError(f"a {'whole ' * whole}number{ends}")
     return raw if whole else float(np.float32(raw / turn))  # as Blender keeps it
