@@ -15,7 +15,6 @@
 #define COVER 1.2         // half axes in spacings: of random points exp(-pi r^2) stay uncovered, 1 %, which filling closes
 #define COVER_BORDER 0.35 // across a border
 #define COVER_LINE 0.6    // of a line's points, in spacings along it
-#define COVER_DOT 0.2     // of volume and strays, in distances to the nearest neighbour
 #define COVER_ROUGH 0.2   // of what is hardly a volume (creases, ornaments), in spacings, so that no cracks show there
 #define ROUGH 0.35        // thickness over width, squared: between FLATTEST and this the one turns into the other
 #define UNEVEN 2.5        // spacings along and across differ less than this by chance: of random points two in three
@@ -134,7 +133,7 @@ static int is_stray(const struct pt_sample *sample, struct pt_neighbourhood *out
     const double mutual = mutual_distance(sample, NULL), second = sqrt(sample->square[1]);
     if (!(second > STRAY_DISTANCE * mutual) || !(mutual > 0.0))
         return 0;
-    be_dot(PT_KIND_STRAY, COVER_DOT * mutual, mutual, 1.0 - STRAY_DISTANCE * mutual / second, out);
+    be_dot(PT_KIND_STRAY, PT_COVER_DOT * mutual, mutual, 1.0 - STRAY_DISTANCE * mutual / second, out);
     return 1;
 }
 
@@ -329,7 +328,7 @@ static void be_volume(const struct pt_sample *sample, const struct pt_plane *pla
     const double spacing = farthest * pt_cbrt(4.0 * PI / (3.0 * sample->count));
     const double thick = sqrt(plane->value[0] / plane->value[1]);
     const double rough = fmax((ROUGH - plane->value[0] / plane->value[1]) / (ROUGH - FLATTEST), 0.0);
-    const double radius = COVER_DOT * nearest + rough * fmax(COVER_ROUGH * spacing - COVER_DOT * nearest, 0.0);
+    const double radius = PT_COVER_DOT * nearest + rough * fmax(COVER_ROUGH * spacing - PT_COVER_DOT * nearest, 0.0);
     be_dot(PT_KIND_VOLUME, radius, fmin(spacing, 2.0 * nearest), fmin(thick, 1.0), out);
     out->sigma = sqrt(plane->value[0]);
 }
@@ -372,7 +371,7 @@ void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *
     if (!distinct) // alone, or all at one place
         return;
     if (distinct < 3) {
-        be_dot(PT_KIND_STRAY, COVER_DOT * nearest, nearest, 0.0, out);
+        be_dot(PT_KIND_STRAY, PT_COVER_DOT * nearest, nearest, 0.0, out);
         return;
     }
     if (is_stray(sample, out))

@@ -20,6 +20,8 @@ struct pt_plane { // of the point and those of its neighbours that `inside` mark
 
 #define PT_UNEVEN_ROWS 3.5 // pt_neighbourhood.uneven of rows: nine in ten random points show less
 
+#define PT_COVER_DOT 0.2 // half axes of volume and strays, in distances to the nearest neighbor
+
 struct pt_neighbourhood {
     uint32_t kind;             // PT_KIND_*
     int has_normal, sided;     // sided: the normal is known to be on its side

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What every point knows: neighbours against all distances, kinds and footprints on known shapes, hard cases, cancel.
+#include "scene/soft.h"
 #include "scene/analysis.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
@@ -660,14 +661,51 @@ static void test_soft(void **state)
     points_free(&points);
 }
 
+// Balls of foliage are as large as the points lie apart in space, although its dots are small.
+static void test_soft_foliage(void **state)
+{
+    (void)state;
+    enum { COUNT = 20000 };
+    static double p[COUNT][3];
+    struct pcg random = pcg_seed(8);
+    for (uint32_t n = 0; n < COUNT; n++)
+        for (int k = 0; k < 3; k++)
+            p[n][k] = 10.0 * pcg_unit(&random);
+    patina_cloud *cloud = build_doubles(&p[0][0], COUNT);
+    analyse(cloud, 0);
+    double sum = 0.0;
+    uint32_t dots = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        for (uint32_t i = cloud->chunks[c].first; i < cloud->chunks[c].first + cloud->chunks[c].count; i++) {
+            dots += (cloud->shapes[i] >> PT_SHAPE_KIND_SHIFT & 7u) == PT_KIND_VOLUME;
+            sum += (double)pt_soft_radius(cloud, &cloud->chunks[c], i);
+        }
+    const double apart = sum / COUNT / 1.128379167 * cbrt(COUNT / 1000.0); // in those of even points in space
+    printf("  foliage: balls of %.2f spacings; %.0f %% of the points are foliage\n", apart, 100.0 * dots / COUNT);
+    assert_true(dots > COUNT / 2);
+    assert_true(apart > 0.8 && apart < 1.2); // 0.1 where the ball is the dot's
+    patina_cloud_destroy(cloud);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_neighbours), cmocka_unit_test(test_torus),          cmocka_unit_test(test_kinds),
-        cmocka_unit_test(test_sigma),      cmocka_unit_test(test_far_away),       cmocka_unit_test(test_hard),
-        cmocka_unit_test(test_words),      cmocka_unit_test(test_threads),        cmocka_unit_test(test_orientation),
-        cmocka_unit_test(test_votes),      cmocka_unit_test(test_saved_and_task), cmocka_unit_test(test_cancel_and_refusals),
-        cmocka_unit_test(test_soft),       cmocka_unit_test(test_parts),          cmocka_unit_test(test_lattice),
+        cmocka_unit_test(test_soft_foliage),
+        cmocka_unit_test(test_neighbours),
+        cmocka_unit_test(test_torus),
+        cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_sigma),
+        cmocka_unit_test(test_far_away),
+        cmocka_unit_test(test_hard),
+        cmocka_unit_test(test_words),
+        cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_orientation),
+        cmocka_unit_test(test_votes),
+        cmocka_unit_test(test_saved_and_task),
+        cmocka_unit_test(test_cancel_and_refusals),
+        cmocka_unit_test(test_soft),
+        cmocka_unit_test(test_parts),
+        cmocka_unit_test(test_lattice),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
