@@ -296,7 +296,7 @@ static void forget_point(struct walk *walk, uint32_t chunk_index, uint32_t slot)
 {
     const uint32_t given = walk->given ? walk->cloud->surfels[slot] & PT_NORMAL_BITS : PT_NORMAL_NONE;
     struct tally *tally = &walk->tallies[chunk_index];
-    tally->kinds[walk->out->shapes[slot] >> PT_SHAPE_KIND_SHIFT & 7u]--;
+    tally->kinds[PT_SHAPE_KIND(walk->out->shapes[slot])]--;
     tally->estimated -= (walk->out->surfels[slot] & PT_NORMAL_BITS) != given;
 }
 

@@ -96,7 +96,7 @@ int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8])
         return 0;
     for (uint32_t sight = 0; sight < 256; sight++) {
         const uint32_t word = sight << PT_SHAPE_SIGHT_SHIFT;
-        const uint32_t out = (style->hidden_kinds >> (word >> PT_SHAPE_KIND_SHIFT & 7u) & 1u) |
+        const uint32_t out = (style->hidden_kinds >> PT_SHAPE_KIND(word) & 1u) |
                              ((word >> PT_SHAPE_TRUST_SHIFT & 15u) < trusted) |
                              (style->free_space == PATINA_FREE_SPACE_USE && (word & PT_SHAPE_SEEN_THROUGH));
         hidden[sight / 32] |= out << sight % 32;

@@ -157,7 +157,7 @@ static uint32_t look_around(const struct look *look, uint32_t x, uint32_t y, dou
 // by a share of the range.
 static double farther_by(const struct look *look, const struct sight *at, uint32_t shape)
 {
-    const uint32_t kind = shape >> PT_SHAPE_KIND_SHIFT & 7u;
+    const uint32_t kind = PT_SHAPE_KIND(shape);
     const double sigma = look->job->spacing_base / 16.0 * pt_spacing_of_class(shape >> PT_SHAPE_SIGMA_SHIFT & 63u);
     const double step = fmax(look->cell[0] * pt_cos(at->elevation), look->cell[1]);
     const double thick = kind == PT_KIND_SURFACE || kind == PT_KIND_BORDER ? farther_sigmas * sigma : 0.0;

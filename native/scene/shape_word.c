@@ -88,7 +88,7 @@ uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits
 
 void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct pt_neighbourhood *out)
 {
-    *out = (struct pt_neighbourhood){.kind = shape >> PT_SHAPE_KIND_SHIFT & 7u};
+    *out = (struct pt_neighbourhood){.kind = PT_SHAPE_KIND(shape)};
     out->major = base * pt_spacing_of_class(shape & 63u);
     out->minor = out->major * pt_exp2(-(double)(shape >> PT_SHAPE_RATIO_SHIFT & 15u) / 4.0);
     out->sigma = base / 16.0 * pt_spacing_of_class(shape >> PT_SHAPE_SIGMA_SHIFT & 63u);

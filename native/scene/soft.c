@@ -25,7 +25,7 @@ float pt_soft_radius(const struct patina_cloud *cloud, const struct pt_chunk *ch
 {
     if (cloud->radii)
         return cloud->radii[slot];
-    const uint32_t kind = cloud->shapes ? cloud->shapes[slot] >> PT_SHAPE_KIND_SHIFT & 7u : PT_KIND_UNKNOWN;
+    const uint32_t kind = cloud->shapes ? PT_SHAPE_KIND(cloud->shapes[slot]) : PT_KIND_UNKNOWN;
     const double dot = kind == PT_KIND_VOLUME || kind == PT_KIND_STRAY ? OF_DOT : 1.0, mean = (double)chunk->spacing,
                  own = dot * cloud->spacing_base * pt_spacing_of_class(cloud->surfels[slot] >> PT_SPACING_SHIFT);
     return (float)(RADIUS_SPACINGS * (own > 0.0 ? fmin(own, widest(cloud) * mean) : mean));

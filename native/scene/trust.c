@@ -128,7 +128,7 @@ static int look_around(const struct pt_trust *trust, const struct pt_sample *sam
         const double reach = length_of(trust->reach[places[i]], trust->base);
         out->reach[i] = reach;
         out->far[i] = sqrt(sample->square[i]);
-        out->kind[i] = word >> PT_SHAPE_KIND_SHIFT & 7u;
+        out->kind[i] = PT_SHAPE_KIND(word);
         out->sigma[i] = sigma_of(trust, word);
         out->mean += reach / K;
         out->near_mean += i < NEAR ? reach / NEAR : 0.0;
@@ -216,7 +216,7 @@ static void compare_words(const struct pt_trust *trust, const struct around *aro
         lines += around->kind[i] == PT_KIND_LINE;
         sigmas += around->sigma[i] / K;
     }
-    f[PT_TRUST_KIND] = (float)(word >> PT_SHAPE_KIND_SHIFT & 7u);
+    f[PT_TRUST_KIND] = (float)PT_SHAPE_KIND(word);
     f[PT_TRUST_SURFACES] = (float)surfaces;
     f[PT_TRUST_LINES] = (float)lines;
     f[PT_TRUST_SIGMA] = (float)(sigma_of(trust, word) / d16);

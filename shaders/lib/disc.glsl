@@ -63,7 +63,7 @@ void disc_size(uint slot, uint word, inout disc d)
     if (disc_shaped()) {
         d.shape = radii[slot];
         radius = discs[instance].instance.spacing[d.shape & PT_SHAPE_CLASS_BITS];
-        if (((d.shape >> PT_SHAPE_KIND_SHIFT) & 7u) == PT_KIND_SURFACE)
+        if (PT_SHAPE_KIND(d.shape) == PT_KIND_SURFACE)
             radius = radius * discs[instance].surface_scale;
         d.ratio = pt_shape_ratios[(d.shape >> PT_SHAPE_RATIO_SHIFT) & 15u];
     } else if (!(radius > 0.0) && discs[instance].has_radii != 0u) {

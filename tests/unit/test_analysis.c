@@ -677,13 +677,13 @@ static void test_soft_foliage(void **state)
     uint32_t dots = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = cloud->chunks[c].first; i < cloud->chunks[c].first + cloud->chunks[c].count; i++) {
-            dots += (cloud->shapes[i] >> PT_SHAPE_KIND_SHIFT & 7u) == PT_KIND_VOLUME;
+            dots += PT_SHAPE_KIND(cloud->shapes[i]) == PT_KIND_VOLUME;
             sum += (double)pt_soft_radius(cloud, &cloud->chunks[c], i);
         }
     const double apart = sum / COUNT / 1.128379167 * cbrt(COUNT / 1000.0); // in those of even points in space
     printf("  foliage: balls of %.2f spacings; %.0f %% of the points are foliage\n", apart, 100.0 * dots / COUNT);
     assert_true(dots > COUNT / 2);
-    assert_true(apart > 0.8 && apart < 1.2); // 0.1 where the ball is the dot's
+    assert_true(apart > 0.8 && apart < 1.2); // 0.2 where balls are dots
     patina_cloud_destroy(cloud);
 }
 
