@@ -54,7 +54,9 @@ uint32_t pt_default_level(const uint64_t counts[PT_TRUST_LEVELS])
         right += (double)counts[l] * pt_trust_of_level(l);
         lost += l < level ? (double)counts[l] * pt_trust_of_level(l) : 0.0;
     }
-    for (; level < most && below >= CLEAN * all && below > 0.0; level++) {
+    if (below == 0.0 || below < CLEAN * all)
+        return level;
+    for (; level < most; level++) {
         lost += (double)counts[level] * pt_trust_of_level(level);
         if (lost > 0.01 * right)
             break;
