@@ -150,8 +150,8 @@ def by_scene(rows: list[dict[str, Any]]) -> str:
     return table(["scene", "drawn by", "PSNR", "false %", "lost %", "sky %", "work, ms"], body)
 
 
-NAMES = {"default": "Patina", "all": "Patina, all points", "sor": "SOR filter, then Patina", "noise": "noise filter, then Patina", "stations": "Patina, scanners known", "free": "Patina, free space used",
-         "grid": "Patina, scanners' grids used",
+NAMES = {"default": "Patina", "all": "Patina, all points", "sor": "SOR filter, then Patina", "noise": "noise filter, then Patina",
+         "stations": "Patina, scanners known", "free": "Patina, free space used", "grid": "Patina, scanners' grids used",
          "filling": "Patina, filling alone",
          "discs": "Patina, discs of 1.75 spacings", "ranges": "Patina, range images"}
 SHOWN = ("default", "stations", "free", "grid", "filling", "discs", *VTK, *CYCLES)  # of the bench

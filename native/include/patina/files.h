@@ -24,11 +24,10 @@ typedef struct patina_file_info {
     double origin[3];              // float64 origin that positions are relative to; 0 unless float32 would lose detail
     double box_min[3], box_max[3]; // of all finite positions, origin included
     uint64_t invalid_positions;
-    uint32_t
-        stations;    // places of a scanner, one a scan: attribute "scan" of a point says which is its own, if any; 0: not known
-    uint32_t scans;  // that the file tells of: patina_file_get_scan; 0: none
-    uint32_t splats; // 1: Gaussian splats, taken as discs: attributes "opacity", 0..1, and "radius", of patina_cloud_desc
-    uint32_t unused; // says nothing
+    uint32_t stations; // places of scanners, one a scan; a point's attribute "scan" says which is its own, if any; 0: not known
+    uint32_t scans;    // that the file tells of: patina_file_get_scan; 0: none
+    uint32_t splats;   // 1: Gaussian splats, taken as discs: attributes "opacity", 0..1, and "radius", of patina_cloud_desc
+    uint32_t unused;   // says nothing
 } patina_file_info;
 
 typedef struct patina_file_attribute {
