@@ -14,8 +14,13 @@ bl_info = {  # for Blender 3.4 to 4.1; later ones read blender_manifest.toml
 import bpy
 from bpy.app.handlers import persistent
 
-from . import engine, histogram, migrate, operators, overlays, pairs, preferences, properties, render, thinned, ui, versions, viewport
-from .sync import clouds, files, images, meshes
+from . import migrate, operators, preferences, properties, ui, versions
+from .draw import engine, histogram, overlays, render, thinned, viewport
+from .properties import answers
+from .sync.analyses import estimates
+from .sync.objects import images, meshes
+from .sync.points import built, files
+from .sync.view import pairs
 
 _MODULES = (preferences, properties, files, migrate, pairs, overlays, thinned, engine, operators, ui)
 _UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
@@ -26,7 +31,7 @@ def _forget(*_) -> None:
     """Another file: its data may carry the names of the last one's."""
     viewport.close_all()
     histogram.forget()
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     meshes.CACHE.clear()
     images.CACHE.clear()
 
@@ -37,6 +42,8 @@ def _undone(*_) -> None:
 
 
 def register() -> None:
+    answers.layer_distance, answers.automatic_trust = estimates.layer_distance, histogram.automatic_trust
+    answers.linked_file, answers.link_file = files.shown_text_of, files.assign
     for module in _MODULES:
         module.register()
     bpy.app.handlers.load_pre.append(_forget)
@@ -53,7 +60,7 @@ def unregister() -> None:
     histogram.forget()
     for module in reversed(_MODULES):
         module.unregister()
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     meshes.CACHE.clear()
     images.CACHE.clear()
     render.forget_device()

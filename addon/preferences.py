@@ -9,45 +9,15 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy.types import AddonPreferences, Context
 
-from . import memory, readers, versions
+from . import choices, memory, versions
+from .choices import CACHE_GIGA, GIGA, PAGES_GIGA, PREVIEW_POINTS
+from .operators import preferences as operators
 from .properties.automatic import switch
-
-GIGA = 1 << 30
-CACHE_GIGA = 32  # of clouds on the disk, 23 bytes a point: a sequence has many
-PAGES_GIGA = 8  # of fetched parts of files, some 10 bytes a point
-PREVIEW_POINTS = 50_000  # of each cloud, in Solid shading and the like
+from .read import readers
+from .ui import rows
 
 
-def get() -> PatinaPreferences | None:
-    """None where the add-on is not enabled in the preferences, as in tests: then defaults hold."""
-    addon = bpy.context.preferences.addons.get(__package__)
-    return addon.preferences if addon else None
-
-
-def readers_folder() -> Path:
-    """Of this Blender's Python."""
-    return Path(bpy.utils.user_resource('SCRIPTS', path="addons")) / "patina-readers" / readers.TAG
-
-
-def cache_bytes() -> int:
-    """How much the caches may take."""
-    known = get()
-    return GIGA * (known.cache_limit if known else CACHE_GIGA)
-
-
-def cloud_bytes() -> int:
-    """How much a picture may hold of linked clouds at a time; 0: by what is free."""
-    known = get()
-    return GIGA * known.cloud_limit if known else 0
-
-
-def preview_points() -> int:
-    """How many points of each cloud Solid and Material Preview shading show."""
-    known = get()
-    return known.preview_points if known else PREVIEW_POINTS
-
-
-def _use(group: PatinaPreferences, _context: Context) -> None:
+def _use(group: AddonPreferences, _context: Context) -> None:
     memory.limit = GIGA * group.memory_limit
 
 
@@ -101,8 +71,6 @@ class PatinaPreferences(AddonPreferences):
         description="Allow downloads from addresses that you open. In Blender 4.2 and later, Blender's own setting under System applies")
 
     def draw(self, context: Context) -> None:
-        from .operators import preferences as operators  # which needs these
-        from .ui import rows
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -148,14 +116,14 @@ class PatinaPreferences(AddonPreferences):
 def register() -> None:
     bpy.utils.register_class(PatinaPreferences)
     readers.look_in(Path(__file__).parent / "packages")  # of the zip for Blender 3.4 to 4.1; later ones install wheels
-    readers.look_in(readers_folder())
-    known = get()
+    readers.look_in(choices.readers_folder())
+    known = choices.get()
     if known:
         _use(known, bpy.context)
 
 
 def unregister() -> None:
-    readers.look_no_more_in(readers_folder())
+    readers.look_no_more_in(choices.readers_folder())
     readers.look_no_more_in(Path(__file__).parent / "packages")
     bpy.utils.unregister_class(PatinaPreferences)
     memory.limit = 0

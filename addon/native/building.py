@@ -11,12 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from . import Cloud, PatinaError, Progress, Task, _describe, _Handle, _handle_of, abi
+from . import abi
+from .arrays import describe
+from .clouds import Cloud
+from .handles import Handle, Progress, Task, handle_of
+from .loader import PatinaError
 
 Corner = tuple[float, float, float]
 
 
-class Builder(_Handle):
+class Builder(Handle):
     """Writes a file that Cloud.open maps. memory: bytes that it takes at most, 0: a third of what is free; count and box of all points,
     as far as known. narrow: what add() says of it; zeros: whether what is zero everywhere stays. Nothing of it is left where it is closed before its end.
     Pieces are sorted while the caller reads the next one."""
@@ -45,7 +49,7 @@ class Builder(_Handle):
         before from being taken, and whatever comes after it, too."""
         arrays = positions, normals, colors, opacities, radii, scalars, classes
         self._wait()
-        self._adding.append(Task("add_to_build", self._handle, byref(_describe(*arrays, origin=origin)), keep=arrays))
+        self._adding.append(Task("add_to_build", self._handle, byref(describe(*arrays, origin=origin)), keep=arrays))
 
     def _wait(self) -> None:
         if not self._finalizer.alive:
@@ -61,7 +65,7 @@ class Builder(_Handle):
     def start_end(self, progress: Progress | None = None) -> Task:
         """A task that writes the file: once, and then nothing may be added."""
         self._wait()
-        return Task("end_build", self._handle, _handle_of(progress), keep=(self, progress))
+        return Task("end_build", self._handle, handle_of(progress), keep=(self, progress))
 
 
 def _settle(adding: list[Task]) -> None:
@@ -72,5 +76,5 @@ def _settle(adding: list[Task]) -> None:
 def start_analysis(cloud: Cloud, path: Path, to: Path, memory: int = 0, progress: Progress | None = None, **given: Any) -> Task:
     """A task that writes the saved cloud in path, which cloud maps and which stays, with what an analysis finds, to another file: whole or not at
     all. memory: bytes that it takes at most, 0: a third of what is free. given: as Cloud.analyse."""
-    described, kept = cloud._describe_analysis(**given)
-    return Task("analyse_file", os.fsencode(path), byref(described), memory, os.fsencode(to), _handle_of(progress), keep=(*kept, progress))
+    described, kept = cloud.describe_analysis(**given)
+    return Task("analyse_file", os.fsencode(path), byref(described), memory, os.fsencode(to), handle_of(progress), keep=(*kept, progress))

@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from . import Cloud, Frame, Progress, Scene, _Handle, _handle_of, abi
+from . import abi
+from .clouds import Cloud
+from .frames import Frame, Scene
+from .handles import Handle, Progress, handle_of
 from .loader import PatinaError, check, library
 
 
-class Mask(_Handle):
+class Mask(Handle):
     """Which points of a cloud are hidden and which selected; None: none. Of this cloud alone, and never another one."""
 
     _kind = "mask"
@@ -33,7 +36,7 @@ def _address(cloud: Cloud, scans: np.ndarray | None) -> int | None:
     return scans.ctypes.data
 
 
-class Grade(_Handle):
+class Grade(Handle):
     """A cloud's own colors, changed by scan. scans: (count,) uint16, or None: all are of the first. grades: gain, gamma, saturation
     and temperature of each. balance: (grades, 3) gains of red, green and blue before these, or None. keep_colors: points that were
     measured without a color are black. PatinaError for a cloud without colors."""
@@ -55,11 +58,11 @@ def gains(cloud: Cloud, scans: np.ndarray, count: int, progress: Progress | None
     """(count, 3) float32: what multiplies red, green and blue of each scan so that their light agrees where scans overlap. scans:
     (cloud.count,) uint16. PatinaError for a cloud without colors."""
     found = np.ones((count, 3), np.float32)
-    check(library().patina_cloud_balance(cloud._handle, _address(cloud, scans), count, _handle_of(progress), found.ctypes.data), cloud._handle)
+    check(library().patina_cloud_balance(cloud._handle, _address(cloud, scans), count, handle_of(progress), found.ctypes.data), cloud._handle)
     return found
 
 
-class ScanSet(_Handle):
+class ScanSet(Handle):
     """The scans that a cloud was made of, for range images. of: (count,) uint16, or None: all are of the first; scans: the direction in
     which each scanner looked, and the interval of its samples, 0 where that is not known."""
 
@@ -71,7 +74,7 @@ class ScanSet(_Handle):
         super().__init__(cloud._handle, address, values, len(scans), blame=(cloud._handle,))
 
 
-class Field(_Handle):
+class Field(Handle):
     """A number of 0 to 1 for each point of a cloud, (count,) float32: points with more than a style's soft_threshold are soft."""
 
     _kind = "field"
@@ -81,7 +84,7 @@ class Field(_Handle):
         if values is not None:
             numbers = np.ascontiguousarray(values, np.float32).reshape(-1)
             desc |= {"values": numbers.ctypes.data, "count": len(numbers)}
-        super().__init__(cloud._handle, byref(abi.FieldDesc(**desc)), _handle_of(progress))
+        super().__init__(cloud._handle, byref(abi.FieldDesc(**desc)), handle_of(progress))
         info = abi.FieldInfo()
         self._call("get_info", byref(info))
         self.range = tuple(info.range)  # numbers that became 0 and 1
@@ -96,7 +99,7 @@ def pick(scene: Scene, instance: int, polygon: np.ndarray | None, frame: Frame |
     desc = abi.Pick(instance=instance, polygon=None if corners is None else corners.ctypes.data,
                     corners=0 if corners is None else len(corners), classes=tuple(classes))
     bits = np.zeros((scene.clouds[instance].count + 7) // 8, np.uint8)
-    check(library().patina_scene_pick(scene._handle, frame._handle if frame else None, byref(desc), _handle_of(progress),
+    check(library().patina_scene_pick(scene._handle, frame._handle if frame else None, byref(desc), handle_of(progress),
                                       bits.ctypes.data, bits.nbytes), scene._handle, *([frame._handle] if frame else []))
     return bits
 

@@ -8,16 +8,18 @@ from collections.abc import Iterator
 from ctypes import byref
 from pathlib import Path
 
-from . import File, Progress, _Handle, _handle_of, abi
+from . import abi
+from .files import File
+from .handles import Handle, Progress, handle_of
 
 
-class Rows(_Handle):
+class Rows(Handle):
     """whole: why the file is read whole, "": it comes in windows; count of points is not known where it is."""
 
     _kind = "rows"
 
     def __init__(self, path: Path, progress: Progress | None = None) -> None:
-        super().__init__(os.fsencode(path), _handle_of(progress), create="patina_rows_open", keep=progress)
+        super().__init__(os.fsencode(path), handle_of(progress), create="patina_rows_open", keep=progress)
         info = abi.RowsInfo()
         self._call("get_info", byref(info))
         self.count = info.count

@@ -7,9 +7,10 @@ import bpy
 from bpy.props import StringProperty
 from bpy.types import Context, Operator
 
-from .. import importers, jobs, native, styles
-from ..importers import origin
-from ..sync import addresses, clouds, files, linked
+from .. import jobs, native
+from ..read import importers
+from ..styles import styles
+from ..sync.points import addresses, built, files, linked, origin
 from .steps import Stepped
 
 
@@ -37,7 +38,7 @@ class PATINA_OT_import_address(Stepped, Operator):
         try:
             source = linked.source(address)
             found = yield from linked.steps(source, self._progress)
-            clouds.CACHE.keep_streamed(source, found.cloud)
+            built.CACHE.keep_streamed(source, found.cloud)
         except native.PatinaCancelled:
             return {'CANCELLED'}
         except native.PatinaError as error:

@@ -12,8 +12,11 @@ from bpy.types import Context, Event, Operator
 from mathutils import Matrix, Vector
 
 from .. import jobs, native, point_data
-from ..importers import NORMAL_NAME, WHOLE, Progress
-from ..sync import analysis, analyzing, attributes, clouds, linked, losses
+from ..read.importers import Progress
+from ..sync import losses
+from ..sync.analyses import analysis, analyzing
+from ..sync.points import attributes, content, linked
+from ..sync.points.made import NORMAL_NAME, WHOLE
 from . import polls
 from .steps import Stepped
 
@@ -206,7 +209,7 @@ def _radius_of(obj: bpy.types.Object, surface: str, frame: int, known: dict[tupl
     one = (patina.soft.radius if patina.soft.use_radius else 0.0) if patina.soft.use else patina.radius
     if one > 0.0:
         return one, 0.0
-    name = clouds.radius_name(obj, surface)
+    name = content.radius_name(obj, surface)
     key = (obj.data.as_pointer(), name)
     if key not in known:
         known[key] = _largest_radius(obj, name, frame)

@@ -8,7 +8,7 @@ from bpy.types import Context, Menu, Object, Operator
 from mathutils import Vector
 
 from .. import point_data
-from ..engine import PatinaRenderEngine
+from ..draw.engine import PatinaRenderEngine
 
 SMALLEST = 1e-3  # half size of a box around points that lie in a plane
 

@@ -9,7 +9,7 @@ from bpy.app.handlers import persistent
 from bpy.types import Context, Operator
 
 from .. import jobs, native, point_data
-from ..sync import attributes, linked
+from ..sync.points import attributes, linked
 
 STOPS = 6  # of a custom ramp that begins as one of ours
 SHARE = 0.02  # of the points that a robust range leaves out at either end

@@ -7,8 +7,8 @@ import bpy
 from bpy.props import EnumProperty
 from bpy.types import Context, Operator, Scene, TOPBAR_MT_render
 
-from .. import combination, pairs
-from ..pairs import MARK
+from ..sync.view import combination, pairs
+from ..sync.view.pairs import MARK
 
 
 class PATINA_OT_combine(Operator):

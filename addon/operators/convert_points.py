@@ -8,8 +8,9 @@ from __future__ import annotations
 import bpy
 from bpy.types import ID, Context, Object, Operator
 
-from .. import importers, point_data
-from ..sync import attributes
+from .. import point_data
+from ..read import importers
+from ..sync.points import attributes
 from . import polls
 
 

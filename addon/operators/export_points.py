@@ -14,10 +14,13 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
 
-from .. import exporters, importers, jobs, native, point_data
-from ..importers import origin, scans
-from ..sync import analysis, attributes, edits, linked, trust
-from ..sync.analyzing import ANALYSES
+from .. import jobs, native, point_data
+from ..read import importers
+from ..read.importers import scans
+from ..sync.analyses import analysis, trust
+from ..sync.analyses.analyzing import ANALYSES
+from ..sync.points import attributes, edits, linked, origin
+from ..write import exporters
 
 
 class PATINA_OT_export_points(Operator, ExportHelper):

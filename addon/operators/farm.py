@@ -13,8 +13,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy.types import Context, Operator, Scene
 
-from ..engine import PatinaRenderEngine
-from ..sync import files, linked, sequence
+from ..draw.engine import PatinaRenderEngine
+from ..sync.points import files, linked, sequence
 
 MOVIES = {'FFMPEG', 'AVI_JPEG', 'AVI_RAW'}
 PLAIN = {'R_LAYERS', 'COMPOSITE', 'GROUP_OUTPUT', 'GROUP_INPUT', 'VIEWER'}  # nodes that change no pixel

@@ -10,7 +10,7 @@ import bpy
 from bpy.types import Object, Scene
 
 from .. import jobs, native, point_data
-from ..sync import attributes, linked
+from ..sync.points import attributes, linked
 from . import colors, view_transform
 
 PLASTER = "plaster"  # the style of points that have positions alone

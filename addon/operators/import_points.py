@@ -12,9 +12,11 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 from bpy.types import Context, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
-from .. import importers, jobs, native, point_data, styles
-from ..importers import PointFile, name_of, origin, saved, told
-from ..sync import addresses, clouds, files, linked, sequence
+from .. import jobs, native, point_data
+from ..read import importers
+from ..read.importers import PointFile, name_of, saved, told
+from ..styles import styles
+from ..sync.points import addresses, built, files, linked, made, origin, sequence
 from . import set_up, stations
 from .steps import Stepped
 
@@ -146,7 +148,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
                 return self._ended([data for data, *_ in found])
             if points:
                 units = points.notes.get("units", METERS)
-                found.append((importers.to_data(points, cloud), points.origin, units, points.splats))
+                found.append((made.to_data(points, cloud), points.origin, units, points.splats))
         if not found:
             return {'CANCELLED'}
         _select_none()
@@ -226,7 +228,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
                 if not streamed:
                     importers.reader(first)
                 found[name] = yield from linked.steps(source, self._progress.part(index, len(paths)))
-                clouds.CACHE.keep_streamed(source, found[name].cloud)
+                built.CACHE.keep_streamed(source, found[name].cloud)
             except native.PatinaCancelled:
                 return self._ended([])
             except native.PatinaError as error:

@@ -10,9 +10,10 @@ from bpy.props import StringProperty
 from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
 
-from .. import exporters, importers, jobs, native, point_data
-from ..importers import origin
-from ..sync import edits, files, linked
+from .. import jobs, native, point_data
+from ..read import importers
+from ..sync.points import edits, files, linked, made, origin
+from ..write import exporters
 from . import export_points
 
 
@@ -40,7 +41,7 @@ class PATINA_OT_linked_to_mesh(Operator):
         if points is None:
             return {'CANCELLED'}
         box = obj.data
-        obj.data = importers.to_data(points, cloud=False)
+        obj.data = made.to_data(points, cloud=False)
         files.assign(obj, "")
         if edits.PROPERTY in obj:
             del obj[edits.PROPERTY]

@@ -13,8 +13,8 @@ from bpy_extras.io_utils import ExportHelper
 from mathutils import Matrix, Vector
 
 from .. import point_data
-from ..engine import PatinaRenderEngine
-from ..importers import origin
+from ..draw.engine import PatinaRenderEngine
+from ..sync.points import origin
 
 INCH = 0.0254  # metres
 MOST = 65536  # pixels a side, of the library and of Blender

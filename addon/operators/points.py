@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points of a linked cloud: selected, hidden, deleted, restored. All change a custom property of the object (sync/edits.py) and
+"""Points of a linked cloud: selected, hidden, deleted, restored. All change a custom property of the object (sync/points/edits.py) and
 can be undone."""
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 from bpy.types import Context, Object, Operator
 
-from .. import importers, jobs, native
+from .. import jobs, native
 from ..native.points import pick
-from ..sync import clips, clouds, edits, files, linked, sequence, style_of
-from ..sync.analyzing import ANALYSES
+from ..read import importers
+from ..sync import style_of
+from ..sync.analyses.analyzing import ANALYSES
+from ..sync.points import built, edits, files, linked, sequence
+from ..sync.view import clips
 from . import polls
 
 HOW = (('SET', "Set", "Select only these points", 0), ('ADD', "Extend", "Add to the selection", 1), ('SUB', "Subtract", "Remove from the selection", 2),
@@ -40,7 +43,7 @@ def cloud_of(obj: Object, context: Context) -> native.Cloud:
         raise native.PatinaError(notices[0] if notices else "the file is missing")
     if source.streamed:
         raise native.PatinaError("its points are read as needed. Use Linked File > Read Whole to read all of them")
-    return jobs.finish(clouds.CACHE.obtain_linked(source, importers.Progress()))
+    return jobs.finish(built.CACHE.obtain_linked(source, importers.Progress()))
 
 
 def combine(how: str, old: np.ndarray, new: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Object, Operator
 
-from ..sync import edits
+from ..sync.points import edits
 from . import points
 
 KEYS = (("object.patina_points_key_hide", 'H', {}), ("object.patina_points_key_reveal", 'H', {"alt": True}),

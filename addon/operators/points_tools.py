@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty
 from bpy.types import Context, Event, Object, Operator, OperatorMousePath, WorkSpaceTool
 
 from .. import native, sync
-from ..sync import edits
+from ..sync.points import edits
 from . import points, polls
 from .points import HOW
 from .view_tools import OverView, Place, Seen, describe, is_view, place_of

@@ -12,8 +12,9 @@ from bpy.props import CollectionProperty, StringProperty
 from bpy.types import Context, Event, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
-from .. import importers, jobs, native, preferences, readers
-from ..sync import cache, clouds
+from .. import choices, jobs, native
+from ..read import importers, readers
+from ..sync.points import built, cache
 from . import polls
 from .steps import Stepped
 
@@ -71,7 +72,7 @@ class PATINA_OT_install_readers(_Installing, Operator):
         import tempfile
         with tempfile.TemporaryDirectory(prefix="patina-wheels-") as place:
             yield from readers.download(Path(place), PIP)
-            yield from readers.install(Path(place).glob("*.whl"), preferences.readers_folder())
+            yield from readers.install(Path(place).glob("*.whl"), choices.readers_folder())
 
 
 class PATINA_OT_install_reader_files(_Installing, Operator, ImportHelper):
@@ -95,7 +96,7 @@ class PATINA_OT_install_reader_files(_Installing, Operator, ImportHelper):
         found = [wheel for path in chosen for wheel in (path.glob("*.whl") if path.is_dir() else [path])]
         if not found:
             raise readers.ReadersError(f"there is no .whl in {chosen[0]}")
-        yield from readers.install(found, preferences.readers_folder())
+        yield from readers.install(found, choices.readers_folder())
 
 
 class PATINA_OT_clear_cache(Operator):
@@ -106,7 +107,7 @@ class PATINA_OT_clear_cache(Operator):
     bl_options = {'REGISTER', 'INTERNAL'}
 
     def execute(self, _context: Context) -> set[str]:
-        clouds.CACHE.clear()  # maps some of them
+        built.CACHE.clear()  # maps some of them
         count, size = cache.clear()
         self.report({'INFO'}, f"Deleted {count} files, {size / 1e9:.2f} GB")
         return {'FINISHED'}

@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, IntProperty
 from bpy.types import Context, Operator
 from mathutils import Matrix, Vector
 
-from ..sync.analysis import SCANNERS
+from ..sync.analyses.analysis import SCANNERS
 
 
 def positions(obj: bpy.types.Object | None) -> np.ndarray:

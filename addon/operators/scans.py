@@ -7,9 +7,11 @@ import bpy
 import numpy as np
 from bpy.types import Context, Object, Operator
 
-from .. import importers, native, point_data
-from ..importers import scans
-from ..sync import attributes, edits, scans_of
+from .. import native, point_data
+from ..read import importers
+from ..read.importers import scans
+from ..sync.analyses import scans_of
+from ..sync.points import attributes, edits
 from . import points, polls
 
 LOOK = ("gain", "gamma", "saturation", "temperature", "hide", "solo")

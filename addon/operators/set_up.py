@@ -11,7 +11,7 @@ from bpy.types import Context, Object, Operator, Scene
 from mathutils import Vector
 
 from .. import native, point_data
-from ..engine import PatinaRenderEngine
+from ..draw.engine import PatinaRenderEngine
 from . import analyze, first_look, stations
 
 START = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}  # what Blender begins with

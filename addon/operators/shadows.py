@@ -8,7 +8,9 @@ from bpy.props import StringProperty
 from bpy.types import Context, Event, Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from .. import native, render, sync
+from .. import native, sync
+from ..description.scene import SceneDescription
+from ..draw import render
 
 EXTENSION = ".patina-shadows"
 
@@ -54,7 +56,7 @@ class PATINA_OT_bake_shadows(_ShadowOperator, Operator, ExportHelper):
             self.filepath = bpy.path.ensure_ext(bpy.path.basename(bpy.data.filepath).rpartition(".")[0] or "scene", EXTENSION)
         return ExportHelper.invoke(self, context, event)
 
-    def _work(self, description: sync.SceneDescription, path: str) -> None:
+    def _work(self, description: SceneDescription, path: str) -> None:
         render.bake_shadows(description, path)
 
 
@@ -64,7 +66,7 @@ class PATINA_OT_load_shadows(_ShadowOperator, Operator, ImportHelper):
     bl_idname = "patina.load_shadows"
     bl_label = "Load Shadows"
 
-    def _work(self, description: sync.SceneDescription, path: str) -> None:
+    def _work(self, description: SceneDescription, path: str) -> None:
         render.check_shadows(description, path)
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, FloatProperty
 from bpy.types import Context, Event, Operator, OperatorMousePath
 
-from .. import importers, native, sync
+from .. import native, sync
 from ..properties.brush import RADIUS, STRENGTH, THROUGH
+from ..read import importers
 from . import polls
 from .soft_strokes import Stroke, swept, why_not, write
 from .view_tools import OverView, Place, is_view, place_of

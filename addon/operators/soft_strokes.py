@@ -9,8 +9,8 @@ import numpy as np
 from bpy.types import Attribute, Context, Object
 
 from .. import native, point_data
-from ..sync import attributes, edits
-from ..sync.analyzing import ANALYSES
+from ..sync.analyses.analyzing import ANALYSES
+from ..sync.points import attributes, edits
 from .view_tools import Place, Seen, describe
 
 NAME = "soft"  # of a new attribute

@@ -8,7 +8,7 @@ import numpy as np
 from bpy.types import Context, Object, Operator
 from mathutils import Vector
 
-from ..importers import scans, told
+from ..read.importers import scans, told
 from . import polls, scanner
 
 PROPERTY = "patina_station"  # of an empty: the scan's number

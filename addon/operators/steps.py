@@ -8,7 +8,7 @@ import time
 from bpy.types import Context, Event
 
 from .. import jobs
-from ..importers import Progress
+from ..read.importers import Progress
 
 TICK = 0.01  # seconds from one look at a user's operator to the next
 SHARE = 0.03  # seconds that a look works, and a step beyond

@@ -10,7 +10,9 @@ from bpy.props import EnumProperty, StringProperty
 from bpy.types import Context, Event, Object, Operator
 from bpy_extras.io_utils import ImportHelper
 
-from .. import native, point_data, styles, sync, thumbnails, whole
+from .. import native, point_data, sync, whole
+from ..draw import thumbnails
+from ..styles import styles
 
 
 def _points(context: Context) -> Object | None:

@@ -11,9 +11,11 @@ import numpy as np
 from bpy.props import EnumProperty
 from bpy.types import Context, Object, Operator
 
-from .. import importers, native, point_data
-from ..sync import edits, trust
-from ..sync.analyzing import ANALYSES
+from .. import native, point_data
+from ..read import importers
+from ..sync.analyses import trust
+from ..sync.analyses.analyzing import ANALYSES
+from ..sync.points import edits
 from . import points, polls
 from .points import HOW
 

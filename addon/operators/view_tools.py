@@ -13,17 +13,20 @@ import numpy as np
 from bpy.types import Context, Event
 from gpu_extras.batch import batch_for_shader
 
-from .. import jobs, native, render, sync, viewport
+from .. import jobs, native, sync
+from ..description.scene import SceneDescription
+from ..description.view import View
+from ..draw import render, viewport
 from ..native.abi import SURFACE
 from ..native.points import pick
-from ..sync import clouds, edits
+from ..sync.points import clouds, edits
 
 LINE = (1.0, 1.0, 1.0, 0.9)
 FILL = (1.0, 1.0, 1.0, 0.06)
 Place = tuple[float, float]  # pixels of the view from its bottom left
 
 
-def _view(context: Context) -> sync.View:
+def _view(context: Context) -> View:
     """What the picture is that outlines are drawn on: the 3D view's; without one, as scripts have none, the final render's."""
     if context.region_data and context.space_data and context.space_data.type == 'VIEW_3D':
         return sync.viewport_view(context.region, context.space_data, context.region_data, context.scene)
@@ -32,7 +35,7 @@ def _view(context: Context) -> sync.View:
     return sync.final_view(camera and camera.evaluated_get(depsgraph), depsgraph)
 
 
-def describe(context: Context) -> sync.SceneDescription:
+def describe(context: Context) -> SceneDescription:
     """The scene as the view shows it, its clouds built, light and lines left out: what stands where is all that is asked. Soft points
     count as surface, and range images show single points."""
     depsgraph, view, notices = context.evaluated_depsgraph_get(), _view(context), []
@@ -57,7 +60,7 @@ def describe(context: Context) -> sync.SceneDescription:
 class Seen:
     """A scene that is asked for points, of the objects of these names; through: those that others hide too. PatinaError."""
 
-    def __init__(self, description: sync.SceneDescription, names: Collection[str], through: bool) -> None:
+    def __init__(self, description: SceneDescription, names: Collection[str], through: bool) -> None:
         self._wanted = [(index, item.name) for index, item in enumerate(description.clouds) if item.name in names]
         device = render.device_for(description.device)
         self._scene = native.Scene()

@@ -9,8 +9,9 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume, WindowManager, World
 
-from .. import styles
 from ..native import MOST_LAYERS
+from ..styles import styles
+from . import answers
 from .automatic import switch
 from .brush import PatinaBrushProperties
 from .clips import PatinaClipProperties
@@ -187,14 +188,12 @@ class PatinaSceneProperties(PropertyGroup):
 
 def _known_distance(group: PropertyGroup) -> float:
     """The layer distance that the last picture took for the object, to begin with."""
-    from ..sync import estimates  # which needs these properties
-    return estimates.layer_distance(group.id_data.name_full) or 0.01
+    return answers.layer_distance(group.id_data.name_full) or 0.01
 
 
 def _known_trust(group: PropertyGroup) -> float:
     """The threshold that the last picture took for the object, to begin with."""
-    from .. import histogram  # which needs these properties
-    return histogram.automatic_trust(group.id_data.name)
+    return answers.automatic_trust(group.id_data.name)
 
 
 def _known_gap(group: PropertyGroup) -> float:
@@ -202,13 +201,11 @@ def _known_gap(group: PropertyGroup) -> float:
 
 
 def _linked_file(group: PropertyGroup) -> str:
-    from ..sync import files  # which needs these properties
-    return files.told(files.text_of(group.id_data))  # Blender takes no other text from Python
+    return answers.linked_file(group.id_data)
 
 
 def _link_file(group: PropertyGroup, path: str) -> None:
-    from ..sync import files
-    files.assign(group.id_data, path)
+    answers.link_file(group.id_data, path)
 
 
 class PatinaObjectProperties(PropertyGroup):
@@ -289,7 +286,7 @@ class PatinaObjectProperties(PropertyGroup):
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
         description="Color of points that have no color. Until it is set, the base color of their material is used, if there is one")
-    linked_data: PointerProperty(  # where the file's path is kept: sync/files.py
+    linked_data: PointerProperty(  # where the file's path is kept: sync/points/files.py
         type=Volume, name="Linked Data", override=_OVERRIDE, options={'HIDDEN'})
     linked_file: StringProperty(
         name="Linked File", subtype='FILE_PATH', options=_PATH, get=_linked_file, set=_link_file,

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from bpy.types import Context, PropertyGroup
 
-from .. import styles
+from ..styles import styles
 from .heard import EnumProperty, StringProperty
 
 _items: list[tuple[str, str, str, int, int]] = []  # Blender does not keep the strings that a callback gives it

@@ -8,46 +8,27 @@ calling thread; clouds are built by native threads.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 
 from .. import migrate
-from . import clipping, clips, clouds, effects, lights, lines, settings, world
-from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
-from .clips import Clip
-from .clips import of_view as view_clips
-from .clouds import CloudItem, CloudStyle, Pending, PendingLink, Trusted, changed_owners, style_of
-from .effects import Effects
-from .lights import Headlight, Light
-from .lines import Lines
-from .meshes import MeshItem
-from .settings import DeviceChoice, Settings
-from .world import Mist, World
+from ..description.meshes import MeshItem
+from ..description.points import CloudItem
+from ..description.scene import SceneDescription
+from ..description.view import View
+from .lighting import lights, world
+from .lighting.world import World
+from .points import clouds
+from .points.built import Pending, PendingLink
+from .points.style import style_of
+from .points.taking import TakingNow, Trusted, changed_owners
+from .view import clipping, clips, effects, lines, settings
+from .view.camera import CameraError, final_view, viewport_view
+from .view.clips import of_view as view_clips
 
-__all__ = ["Camera", "CameraError", "Clip", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Lines", "MeshItem", "Mist",
-           "Panorama", "Pending", "PendingLink", "Effects", "Focus",
-           "SceneDescription", "Settings", "Trusted", "View", "World", "changed_owners", "describe", "describe_items",
+__all__ = ["CameraError", "Pending", "PendingLink", "Trusted", "World", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "view_clips", "viewport_view"]
-
-
-@dataclass(frozen=True)
-class SceneDescription:
-    clouds: list[CloudItem]
-    meshes: list[MeshItem]
-    clips: list[Clip]
-    lights: list[Light]
-    headlight: Headlight | None
-    lines: Lines | None
-    camera: Camera
-    panorama: Panorama | None  # all around from where the camera stands
-    settings: Settings
-    effects: Effects
-    device: DeviceChoice
-    mist: Mist | None
-    behind: World | None  # what is seen behind all, by direction; None: the settings' background, or a transparent film
-    shadow_file: str  # baked shadow textures; empty: none
-    notices: list[str]  # what the artist should know about things left out, a sentence each
 
 
 def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, float], bool],
@@ -55,7 +36,7 @@ def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, fl
     """Reads the scene of a final render. poll(what, progress of it) is called during long steps and returns True to
     cancel. frame: whose files sequences show, where the scene stands at a moment beside it."""
     notices: list[str] = []
-    taking = clouds.TakingNow(poll, notices)
+    taking = TakingNow(poll, notices)
     return describe_items(depsgraph, view, notices,
                           clouds.collect(depsgraph, taking, notices, frame=frame, settle=taking.settle))
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from .. import pairs
 from ..operators.combine import PATINA_OT_combine, PATINA_OT_other_scene
+from ..sync.view import pairs
 from .panels import PatinaPanel
 
 

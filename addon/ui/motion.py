@@ -6,8 +6,8 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from ..engine import PatinaRenderEngine
-from ..sync import motion
+from ..draw.engine import PatinaRenderEngine
+from ..sync.view import motion
 
 
 class PATINA_PT_motion_blur(Panel):

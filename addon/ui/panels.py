@@ -7,9 +7,9 @@ import bpy
 from bpy.types import Context, Panel, Scene
 
 from .. import point_data
-from ..engine import PatinaRenderEngine
+from ..draw.engine import PatinaRenderEngine
 from ..operators import view_transform
-from ..sync import estimates
+from ..sync.analyses import estimates
 from . import rows
 from .presets import PATINA_PT_presets
 

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.types import Context, Panel
 
-from ..engine import PatinaRenderEngine
+from ..draw.engine import PatinaRenderEngine
 from ..operators import scanner
 from . import rows
 

@@ -11,7 +11,7 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 from bpy.types import Context, Menu, Operator, Panel
 
-from ..engine import PatinaRenderEngine
+from ..draw.engine import PatinaRenderEngine
 
 FOLDER = "patina/render"  # of the artist's own, in Blender's folder of presets
 SHIPPED = Path(__file__).resolve().parents[1] / "presets/render"

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from ..importers import scans
+from ..read.importers import scans
 from . import rows
 from .colors import ColorPanel
 

@@ -7,7 +7,8 @@ import bpy
 from bpy.types import Context, Menu, Panel, UIList
 
 from .. import point_data
-from ..sync import edits, scans_of
+from ..sync.analyses import scans_of
+from ..sync.points import edits
 from . import rows
 from .statistics import SidebarPanel
 

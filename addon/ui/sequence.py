@@ -6,8 +6,8 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from ..engine import PatinaRenderEngine
-from ..sync import files, sequence
+from ..draw.engine import PatinaRenderEngine
+from ..sync.points import files, sequence
 from . import rows
 
 

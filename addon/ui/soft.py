@@ -6,8 +6,9 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Object, Panel, PropertyGroup, UILayout
 
-from .. import histogram, point_data
-from ..sync.colors import scalar_name
+from .. import point_data
+from ..draw import histogram
+from ..sync.points.colors import scalar_name
 from . import rows
 from .colors import ColorPanel
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..engine import PatinaRenderEngine
+from ..draw.engine import PatinaRenderEngine
 
 ENGINE = PatinaRenderEngine.bl_idname
 

@@ -6,10 +6,11 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from .. import pace, point_data, versions, viewport
-from ..engine import PatinaRenderEngine
+from .. import point_data, versions
+from ..draw import pace, viewport
+from ..draw.engine import PatinaRenderEngine
 from ..operators import set_up
-from ..sync.analyzing import ANALYSES
+from ..sync.analyses.analyzing import ANALYSES
 from . import rows
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Menu, Panel
 
-from .. import styles
+from ..styles import styles
 from . import rows
 from .panels import PatinaPanel
 from .statistics import SidebarPanel

@@ -6,9 +6,10 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Object, Panel, PropertyGroup, UILayout
 
-from .. import histogram, point_data
+from .. import point_data
+from ..draw import histogram
 from ..operators.untrusted import PATINA_OT_select_untrusted
-from ..sync import trust
+from ..sync.analyses import trust
 from . import rows
 from .panels import PatinaPanel
 

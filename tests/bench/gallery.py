@@ -97,8 +97,8 @@ SCANS = (
 
 
 def read(scan: Scan) -> Any:
-    from patina.importers import las, library, pcd
-    from patina.importers.reading import Filter, Progress
+    from patina.read.importers import las, library, pcd
+    from patina.read.importers.reading import Filter, Progress
 
     path = DATA / scan.file
     module = {".las": las, ".laz": las, ".pcd": pcd}.get(path.suffix, library)

@@ -32,15 +32,14 @@ LAYERS = 4  # of a half transparent cloud
 
 def package() -> None:
     """The add-on's readers without Blender: the package, but not what registers it."""
-    for name, folder in (("patina", ROOT / "addon"), ("patina.importers", ROOT / "addon/importers")):
-        sys.modules[name] = ModuleType(name)
-        sys.modules[name].__path__ = [str(folder)]
+    sys.modules["patina"] = ModuleType("patina")
+    sys.modules["patina"].__path__ = [str(ROOT / "addon")]
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     from patina import native
-    from patina.importers import las, pcd
-    from patina.importers.reading import Filter, Progress
+    from patina.read.importers import las, pcd
+    from patina.read.importers.reading import Filter, Progress
 
     if path.suffix == ".ply":
         with native.File(str(path)) as file:

@@ -41,7 +41,7 @@ def main() -> None:
     import bpy
     import numpy as np
     from patina import native
-    from patina.sync import meshes
+    from patina.sync.objects import meshes
 
     def unit(v):
         return np.asarray(v) / np.linalg.norm(v, axis=-1, keepdims=True)

@@ -189,14 +189,17 @@ def planes(scene: bpy.types.Scene, folder: str) -> dict:
 
 def in_styles(scene: bpy.types.Scene) -> dict:
     """By style: label, device, milliseconds of each frame but the first, of each pass in the last."""
-    from patina import native, render, styles, sync
+    from patina import native, sync
+    from patina.description.settings import DeviceChoice
+    from patina.draw import render
+    from patina.styles import styles
     result, pictures = {}, {}
     for entry in styles.entries():
         if entry.own:
             continue
         bpy.ops.patina.apply_style(style=entry.key)
         times = []
-        with native.Frame(render.device_for(sync.DeviceChoice("cpu", 0))) as frame:
+        with native.Frame(render.device_for(DeviceChoice("cpu", 0))) as frame:
             for matrix in reversed(DATA["matrix"]):  # the first camera's picture is the last, and kept
                 scene.camera.matrix_world = Matrix(matrix)
                 depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -207,7 +210,7 @@ def in_styles(scene: bpy.types.Scene) -> dict:
                     frame.render(described)
                 times.append(frame.stats()["ms"])
             result[entry.key] = {"label": entry.label, "times": times[1:], "passes": frame.pass_stats()["passes"],
-                                 "device": render.device_for(sync.DeviceChoice("cpu", 0)).name}
+                                 "device": render.device_for(DeviceChoice("cpu", 0)).name}
             pictures |= {f"{entry.key} rgba": frame.read("COMBINED"), f"{entry.key} depth": frame.read("DEPTH")[..., 0]}
     np.savez(TARGET, **pictures)
     return result

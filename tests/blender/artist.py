@@ -17,8 +17,9 @@ import numpy as np
 from check_linked import dense
 from harness import SCRATCH, check, render
 from mathutils import Matrix, Quaternion
-from patina import point_data, viewport
-from patina.sync import clouds
+from patina import point_data
+from patina.draw import viewport
+from patina.sync.points import built
 from session_rounds import operate, undo
 from window import area, override, setup, shown, view
 
@@ -102,7 +103,7 @@ class Artist:
         yield from self.look()
 
     def style(self):
-        from patina import styles
+        from patina.styles import styles
         key = self.chance.choice([found.key for found in styles.entries() if not found.own])
         with override():
             bpy.ops.patina.apply_style(style=key)
@@ -163,7 +164,7 @@ class Artist:
             failed = [found.message for found in viewport._VIEWPORTS if found.message]
             check(not failed or action == self.change_on_disk, f"{self.doing}: {failed}")
         setup()
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         for kind in (bpy.data.actions, bpy.data.images, bpy.data.volumes, bpy.data.materials, bpy.data.texts):
             for item in list(kind):
                 if item.name not in ("Render Result", "Viewer Node"):

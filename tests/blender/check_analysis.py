@@ -27,19 +27,20 @@ from harness import (
 )
 from mathutils import Matrix, Vector
 from patina import native
-from patina.sync import analysis, analyzing, clouds, linked
+from patina.sync.analyses import analysis, analyzing
+from patina.sync.points import built, linked
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
 
 
 def only_cloud():
     """Of the last picture."""
-    (_, cloud), = clouds.CACHE._entries.values()
+    (_, cloud), = built.CACHE._entries.values()
     return cloud
 
 
 def fresh_scene(*size):
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     return new_scene(*size)
 
 
@@ -77,8 +78,8 @@ def test_final_is_analyzed():
     check(off[0] < 3 and off[1] < 8, f"half of the normals are off by {off[0]:.1f} degrees, one of twenty by {off[1]:.1f}")
     obj.patina.analysis = 'OFF'
     plain = render()
-    check(len(clouds.CACHE) == 2, "Off is another cloud")
-    check(not any(cloud.has_shapes for identity, (_, cloud) in clouds.CACHE._entries.items() if not identity[-3]), "Off")
+    check(len(built.CACHE) == 2, "Off is another cloud")
+    check(not any(cloud.has_shapes for identity, (_, cloud) in built.CACHE._entries.items() if not identity[-3]), "Off")
     check(np.abs(plain["Combined"] - picture["Combined"]).max() > 0.01, "the same picture")
     obj.patina.analysis = 'AUTO'
     check((render()["Combined"] == picture["Combined"]).all(), "another picture")
@@ -101,7 +102,7 @@ def test_trust_and_thickness():
     ids = written[-1][1]["NUMBERS"][..., 0].astype(np.int64)
     shows = next(values for name, values in picture.items() if name in ("IndexOB", "Object Index"))[..., 0] == 7
     check(shows.sum() > 500 and not shows[:, 80:].any(), f"{shows.sum()} pixels")
-    cloud, = (cloud for _, cloud in clouds.CACHE._entries.values() if cloud.has_shapes)
+    cloud, = (cloud for _, cloud in built.CACHE._entries.values() if cloud.has_shapes)
     found = cloud.neighbourhoods("sigma", "trust")
     sigma, trust = picture["Thickness"][..., 0], picture["Trust"][..., 0]
     check(ids[shows].max() < len(places), "the first object's points have the first numbers")
@@ -220,11 +221,11 @@ def test_linked_is_kept():
     check(only_cloud().has_shapes and not said("Analyzing"), f"{set(stats)}")
     obj.patina.analysis = 'OFF'
     render()
-    check(any(not cloud.has_shapes for _, cloud in clouds.CACHE._entries.values()), "Off")
+    check(any(not cloud.has_shapes for _, cloud in built.CACHE._entries.values()), "Off")
     kept = list(linked.source(path).kept.parent.glob(linked.source(path).kept.name.split("-")[0] + "-*.cloud"))
     check(linked.source(path).kept.exists() and len(kept) == 2, f"each way of showing it is kept: {kept}")
     obj.patina.analysis = 'AUTO'
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     again = render()
     check(not said("Analyzing"), f"what was kept is there still: {set(stats)}")
     check((again["Combined"] == picture["Combined"]).all(), "another picture")
@@ -247,18 +248,18 @@ def test_range_images_need_none():
         check((bare[name] == analyzed[name]).all(), f"{name} differs by {np.abs(bare[name] - analyzed[name]).max()}")
     obj.patina.analysis = 'AUTO'
     for asks, value in (("cull_back", True), ("least_trust", 0.5)):
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         setattr(obj.patina, asks, value)
         render()
         check(only_cloud().has_shapes, asks)
         obj.patina.property_unset(asks)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     layer = scene.view_layers[0].patina
     layer.use_pass_trust = True
     render()
     check(only_cloud().has_shapes, "the pass Trust")
     layer.use_pass_trust = False
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     obj.patina.ranges.use, scene.patina.surface = False, 'RANGES'
     check((render()["Combined"] == bare["Combined"]).all() and not only_cloud().has_shapes, "the scene's mode")
     scene.patina.surface, obj.patina.ranges.use = 'AUTO', True
@@ -284,7 +285,7 @@ def test_links_of_range_images_need_none():
     check(bare.kept.exists() and (filled["Combined"] != picture["Combined"]).any(), "filled it is analyzed")
     scene.patina.surface = 'RANGES'
     without.kept.unlink()
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     again = render()
     check(only_cloud().has_shapes and not without.kept.exists(), "what is there is taken")
     for name, pixels in picture.items():
@@ -416,7 +417,7 @@ def test_frame_points():
             off = np.linalg.norm(np.array(view.view_location) - [3, 5, -7])
             check(off < 0.1 and 1.5 < view.view_distance < 6, f"a view at {view.view_location[:]}, {view.view_distance:.1f} away")
         bpy.data.objects.remove(obj)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
 
 
 def test_frame_soft_points():
@@ -443,7 +444,7 @@ def test_frame_soft_points():
         check(np.ptp(rows) > 40 and rows.min() > 0 and rows.max() < 119, f"{how}: rows {rows.min()} to {rows.max()} of 120")
         bpy.data.objects.remove(obj)
     scene.patina.surface = 'AUTO'
-    clouds.CACHE.clear()
+    built.CACHE.clear()
 
 
 def test_hidden_points():

@@ -15,10 +15,11 @@ import numpy as np
 from check_formats import e57_file
 from check_import import import_ply
 from harness import SCRATCH, Skip, check, new_scene, render
-from patina import importers, jobs, memory, native, preferences
-from patina.importers import e57, las, library
+from patina import choices, jobs, memory, native
 from patina.native import building as disk
-from patina.sync import building, linked
+from patina.read import importers
+from patina.read.importers import e57_scans, las, las_header, library
+from patina.sync.points import building, linked
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
 
@@ -29,7 +30,7 @@ FAR = np.array([500000.0, 5000000.0, 100.0])
 def scan_file(name, count=COUNT, form=3, **changes):
     """A LAS as flown: a wavy ground in three strips, byte colors shifted, two classes, GPS times that do not begin with the least."""
     rng = np.random.default_rng(5)
-    records = np.zeros(count, las._FORMATS[form])
+    records = np.zeros(count, las_header.POINT_FORMATS[form])
     places = np.column_stack([rng.uniform(-2, 2, (count, 2)), np.zeros(count)])
     places[:, 2] = 0.2 * np.sin(3 * places[:, 0]) * np.cos(2 * places[:, 1]) - 6
     for axis, letter in enumerate("XYZ"):
@@ -274,7 +275,7 @@ def test_same_e57():
     second = scanned(20000, 2, pose=turned)
     del second["classification"]
     path = e57_file("large.e57", scanned(30000, 1, pose=((1.0, 0.0, 0.0, 0.0), (500000.0, 5000000.0, 3.0))), second)
-    size, e57.SMALL_PIECE = e57.SMALL_PIECE, 7000
+    size, e57_scans.SMALL_PIECE = e57_scans.SMALL_PIECE, 7000
     try:
         for wanted in ({"scalar": "intensity"}, {"analyzed": False, "origin": (499999.0, 5000001.0, 90.0)}, {"hide_uncolored": True}):
             same_e57(path, **wanted)
@@ -293,7 +294,7 @@ def test_same_e57():
         gridded = scanned(12000, 3, rowIndex=("integer", (0, 200), np.arange(12000) // 100), columnIndex=("integer", (0, 200), np.arange(12000) % 100))
         check(in_pieces(e57_file("large_grid.e57", gridded), LEAST) is None, "a grid in pieces")
     finally:
-        e57.SMALL_PIECE = size
+        e57_scans.SMALL_PIECE = size
 
 
 def test_cut_ply():
@@ -373,9 +374,9 @@ class OnDisk:
         self.memory, self.told = memory, []
 
     def __enter__(self):
-        self.kept = native.Cloud.start_analysis, native.Cloud.analyse, disk.start_analysis, preferences.cloud_bytes
+        self.kept = native.Cloud.start_analysis, native.Cloud.analyse, disk.start_analysis, choices.cloud_bytes
         native.Cloud.start_analysis = native.Cloud.analyse = lambda *_arguments, **_more: check(False, "analyzed in memory")
-        disk.start_analysis, preferences.cloud_bytes = self._start, lambda: self.memory
+        disk.start_analysis, choices.cloud_bytes = self._start, lambda: self.memory
         return self.told
 
     def _start(self, cloud, path, to, memory, progress, **given):
@@ -383,7 +384,7 @@ class OnDisk:
         return self.kept[2](cloud, path, to, memory, progress, **given)
 
     def __exit__(self, *_):
-        native.Cloud.start_analysis, native.Cloud.analyse, disk.start_analysis, preferences.cloud_bytes = self.kept
+        native.Cloud.start_analysis, native.Cloud.analyse, disk.start_analysis, choices.cloud_bytes = self.kept
 
 
 def without_head(place):

@@ -5,8 +5,9 @@ Blender 4.5 on, on meshes of points in all. See test_window.py for what a yield 
 import bpy
 import numpy as np
 from harness import check, sphere
-from patina import importers, point_data
-from patina.importers import PointFile
+from patina import point_data
+from patina.read.importers import PointFile
+from patina.sync.points import made
 from window import area, override, screenshot, settled, setup, window_region
 
 COUNT = 20_000
@@ -22,7 +23,7 @@ def given(cloud):
     positions, normals = (values[COUNT:] if positions[-1, 2] > 0 else values[:COUNT] for values in (positions, normals))
     points = PointFile("scan", positions.astype(np.float32), normals.astype(np.float32), np.tile(np.uint8((40, 200, 60, 255)), (COUNT, 1)), {},
                        (0.0, 0.0, 0.0), 0, {})
-    obj = bpy.data.objects.new("scan", importers.to_data(points, cloud))
+    obj = bpy.data.objects.new("scan", made.to_data(points, cloud))
     scene.collection.objects.link(obj)
     obj.patina.lighting = 'UNLIT'
     obj.select_set(True)

@@ -5,10 +5,10 @@ both, and odd ones cause one clear message or none."""
 import bpy
 import numpy as np
 from harness import SCRATCH, Skip, add_points, check, check_close, drawn, new_scene, points_of, render, reports, saved, set_world, sphere
-from patina import importers, point_data
-from patina.importers import PointFile
+from patina import point_data
 from patina.operators import convert_points
-from patina.sync import attributes
+from patina.read.importers import PointFile
+from patina.sync.points import attributes, made
 
 CLOUDS = point_data.HAS_CLOUDS
 
@@ -25,7 +25,7 @@ def given(count=3000, **more):
 
 
 def added(points, cloud):
-    obj = bpy.data.objects.new("scan", importers.to_data(points, cloud))
+    obj = bpy.data.objects.new("scan", made.to_data(points, cloud))
     bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
     for other in bpy.context.view_layer.objects:
@@ -198,7 +198,7 @@ def test_analysis_and_soft_points():
     check(obj.data.attributes["kind"].data_type == 'INT8' and len(obj.data.attributes["spacing"].data) == 3000, "not analyzed")
     check(not point_data.are_for_display(obj.data), "radii of the analysis count as for display")
     from patina.operators import soft_strokes
-    from patina.sync import edits
+    from patina.sync.points import edits
     check(not soft_strokes.why_not(obj), soft_strokes.why_not(obj))
     soft_strokes.write(obj, edits.of_flags(np.arange(3000) < 100), 0.5)
     found = attributes.scalars(obj.data, 3000, "soft")[:, 0]
@@ -336,7 +336,7 @@ def test_material_shows_the_colors():
     points = given()
     points.colors = np.tile(np.uint8((250, 10, 10, 255)), (3000, 1))
     obj = added(points, True)
-    again = importers.to_data(given(), True)
+    again = made.to_data(given(), True)
     check(again.materials[0] == obj.data.materials[0], "a material for each import")
     scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.device = 4, False, 'CPU'
     set_world((1.0, 1.0, 1.0))

@@ -7,7 +7,7 @@ import tempfile
 import bpy
 import numpy as np
 from harness import add_points, check, check_close, new_scene, reports
-from patina import pairs
+from patina.sync.view import pairs
 
 
 def crossing():

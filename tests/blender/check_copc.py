@@ -15,8 +15,9 @@ from check_formats import with_laspy
 from copc_files import claim, points_of, too_fine, write_copc
 from harness import SCRATCH, check, new_scene, render, reports, stats
 from mathutils import Matrix
-from patina import memory, native, streaming
-from patina.sync import addresses, clouds, edits, linked
+from patina import memory, native
+from patina.read import streaming
+from patina.sync.points import addresses, built, edits, linked
 from range_server import Server
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
@@ -56,7 +57,7 @@ def free_memory(size):
 
 def stream_of():
     """Of the one cloud that is there."""
-    found = streaming.streams_of(cloud for _, cloud in clouds.CACHE._entries.values())
+    found = streaming.streams_of(cloud for _, cloud in built.CACHE._entries.values())
     check(len(found) == 1, f"{len(found)} streams")
     return found[0]
 
@@ -78,7 +79,7 @@ def test_same_picture_as_flat():
         path, entries, _ = made(name, offset=offset, **how)
         pictures = []
         for stream in ('OFF', 'ON'):
-            clouds.CACHE.clear()
+            built.CACHE.clear()
             new_scene()
             objects = import_copc(path, stream)
             objects[0].patina.analysis = 'OFF'
@@ -94,7 +95,7 @@ def test_same_picture_as_flat():
 def test_what_asks_for_the_whole():
     """Edits and fields are of all points: of those that come as needed pictures are drawn without, and say so."""
     path, _, _ = made("edited.copc.laz")
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     objects = import_copc(path, 'ON')
     see(objects)
@@ -116,7 +117,7 @@ def test_what_asks_for_the_whole():
 
 def test_more_than_memory_is_told_beforehand():
     path, entries, _ = made("much.copc.laz")
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     see(import_copc(path, 'ON'))
     with free_memory(400_000), suppress(RuntimeError):
@@ -130,7 +131,7 @@ def test_more_than_memory_is_told_beforehand():
 
 def test_only_what_is_seen():
     path, entries, positions = made("seen.copc.laz", 60000)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     scene = new_scene()
     see(import_copc(path, 'ON'), -1.15)
     scene.camera.data.lens = 300
@@ -144,12 +145,12 @@ def test_only_what_is_seen():
 
 def test_scalars_and_classes():
     path, _, _ = made("values.copc.laz")
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     obj, = import_copc(path, 'ON')
     obj.patina.colors.source = 'SCALAR'
     obj.patina.colors.scalar = "intensity"
-    clouds.CACHE.clear()  # the one with the file's colours
+    built.CACHE.clear()  # the one with the file's colours
     see([obj])
     render()
     cloud = stream_of().cloud
@@ -161,12 +162,12 @@ def test_scalars_and_classes():
 
 def test_a_small_one_is_read_whole():
     path, _, _ = made("small.copc.laz")
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     obj, = import_copc(path, 'AUTO')
     see([obj])
     render()
-    check(not streaming.streams_of(cloud for _, cloud in clouds.CACHE._entries.values()), "it is streamed")
+    check(not streaming.streams_of(cloud for _, cloud in built.CACHE._entries.values()), "it is streamed")
     obj.patina.stream = 'ON'
     render()
     check(stream_of().cloud.count == POINTS, "it is not streamed")
@@ -185,7 +186,7 @@ def test_files_of_billions_of_points():
     total = POINTS + sum(count for _, count in finer)
     pictures = []
     for name in (path, huge):
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         new_scene()
         reports.clear()
         before = held()
@@ -257,7 +258,7 @@ def test_damaged_files():
                                  ("laszip", 589 + 2, b"nobody", "does not say how its points are packed")):
         bad = SCRATCH / f"bad-{name}.copc.laz"
         bad.write_bytes(good[:800] if at is None else good[:at] + what + good[at + len(what):])
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         new_scene()
         reports.clear()
         try:
@@ -308,12 +309,12 @@ def open_address(address):
 
 def test_address():
     path, entries, _ = made("served.copc.laz")
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     see(import_copc(path, 'ON'))
     local = render()
     for how in ("", "slow", "busy", "flaky"):
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         new_scene()
         with server(path, how) as (address, asked), in_a_hurry():
             obj = open_address(address)
@@ -331,7 +332,7 @@ def test_servers_that_fail():
     path, _, _ = made("fails.copc.laz", 8000)
     for how, told in (("hangs", "does not answer in time"), ("cut", "cut the connection"), ("garbage", "page "), ("other", "a different part"),
                       ("refuses", "answers 404"), ("whole", "sends no parts of files")):
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         new_scene()
         reports.clear()
         with server(path, how) as (address, _), in_a_hurry():
@@ -349,7 +350,7 @@ def test_servers_that_fail():
 
 def test_nothing_is_fetched_unasked():
     path, _, _ = made("unasked.copc.laz", 3000)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     online, addresses.online = addresses.online, lambda: False
     try:
@@ -379,7 +380,7 @@ def test_nothing_is_fetched_unasked():
 
 def test_ends_with_its_cloud():
     path, _, _ = made("ends.copc.laz", 3000)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     see(import_copc(path, 'ON'))
     render()
@@ -387,7 +388,7 @@ def test_ends_with_its_cloud():
     process, place = stream._process, stream._place
     check(process.poll() is None and place.is_dir(), "not there")
     del stream
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     import gc
     gc.collect()

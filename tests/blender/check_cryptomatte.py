@@ -6,8 +6,8 @@ import json
 import bpy
 import numpy as np
 from harness import SCRATCH, Skip, add_points, check, check_close, compositor, end_compositor, new_scene, render, sphere
-from patina import cryptomatte
-from patina import render as drawing
+from patina.draw import cryptomatte
+from patina.draw import render as drawing
 
 SIZE = 64
 

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import bpy
 from check_panels import Drawing, Row, context_of, panels
 from harness import SCRATCH, add_light, add_points, check, sphere
-from patina import viewport
-from patina.sync.analysis import SCANNERS
+from patina.draw import viewport
+from patina.sync.analyses.analysis import SCANNERS
 from patina.ui import rows
 from window import area, settled, setup, window_region
 

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 from harness import SCRATCH, add_points, check, new_scene, patina, render, reports, sphere
-from patina.importers import library
+from patina.read.importers import library
 
 
 def cube(scene):
@@ -81,7 +81,7 @@ def test_export_and_framing():
     edit(points)
     try:
         bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(path), kind='PLY')
-        file = library.read(path, patina.importers.Filter(), patina.importers.Progress())
+        file = library.read(path, patina.read.importers.Filter(), patina.read.importers.Progress())
         check(len(file.positions) == 2000 and file.colors is not None and file.normals is not None, "the exported file")
         check(bpy.ops.object.patina_frame_points() == {'FINISHED'}, "framing")
         check((render()["Combined"][..., 3] > 0).sum() > 100, "an empty picture")

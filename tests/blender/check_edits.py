@@ -6,8 +6,8 @@ import numpy as np
 from check_import import import_ply, write_ply
 from check_linked import dense
 from harness import SCRATCH, check, check_close, drawn, new_scene, patina, render, reports
-from patina.importers import library
-from patina.sync import edits
+from patina.read.importers import library
+from patina.sync.points import edits
 
 ROWS = 60  # of a wall of points, ROWS x ROWS
 
@@ -228,8 +228,8 @@ def test_export_and_conversion():
     obj.select_set(True)
     path = SCRATCH / "exported.ply"
     bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(path))
-    file = library.read(path, patina.importers.Filter(), patina.importers.Progress())
-    source = library.read(SCRATCH / "export.ply", patina.importers.Filter(), patina.importers.Progress())
+    file = library.read(path, patina.read.importers.Filter(), patina.read.importers.Progress())
+    source = library.read(SCRATCH / "export.ply", patina.read.importers.Filter(), patina.read.importers.Progress())
     left = source.scalars["classification"] == 2
     check(len(file.positions) == left.sum() == ROWS * ROWS // 2, f"{len(file.positions)} points")
     check_close(file.positions.astype(np.float64) + file.origin, source.positions[left].astype(np.float64) + source.origin, 1e-3, "places")
@@ -269,11 +269,11 @@ def test_grades():
 def test_scans_of_old_and_damaged_caches():
     """A cache that does not say of which scans its points are is made anew."""
     obj = scene_with_wall("scans.ply")
-    place = patina.sync.linked.source_of(obj, 1, []).kept
+    place = patina.sync.points.linked.source_of(obj, 1, []).kept
     for damage in (lambda: place.with_suffix(".scan").unlink(), lambda: place.with_suffix(".scan").write_bytes(b"12"),
                    lambda: place.with_suffix(".json").write_text('{"origin": [0, 0, 0], "scanners": []}')):
         damage()
-        patina.clouds.CACHE.clear()
+        patina.built.CACHE.clear()
         bpy.ops.object.patina_points_select_by(by='SCAN', number=3)
         check(chosen(obj).sum() == ROWS * ROWS // 2, "scan 3")
     other, = import_ply(dense("one.ply", 500), link=True)
@@ -306,7 +306,7 @@ def test_refusals():
     obj.patina.linked_file = str(SCRATCH / "frame_####.ply")
     check(not bpy.ops.object.patina_points_hide.poll(), "a sequence")
     obj.patina.linked_file = kept
-    patina.clouds.CACHE.clear()
+    patina.built.CACHE.clear()
     (SCRATCH / "gone_wall.ply").unlink()
     try:
         bpy.ops.object.patina_points_select_all(action='SELECT')

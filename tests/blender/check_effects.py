@@ -8,6 +8,7 @@ from check_points import pixel
 from harness import add_light, add_points, check, check_close, linear, new_scene, render, reports, set_world, sphere
 from mathutils import Matrix
 from patina import native, sync
+from patina.description.settings import Effects
 
 POINT = (0.01, 0.01, -3.0)
 SHOWN = [effect for effect in native.abi.EFFECTS if effect["panel"] != "CAMERA"]
@@ -58,7 +59,7 @@ def test_each_does_something():
 
 
 def test_fields_are_the_library_s():
-    described = list(sync.Effects.__dataclass_fields__)
+    described = list(Effects.__dataclass_fields__)
     check(described == [name for name, *_ in native.abi.Effects._fields_[1:]], f"{described}")
 
 

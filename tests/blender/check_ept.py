@@ -11,7 +11,7 @@ from check_formats import with_laspy
 from copc_files import points_of, too_fine
 from ept_files import write_ept
 from harness import SCRATCH, check, new_scene, render, reports, stats
-from patina.sync import clouds
+from patina.sync.points import built
 
 POINTS = 20000
 
@@ -25,14 +25,14 @@ def tiles(name, count=POINTS, offset=(0.0, 0.0, 0.0), **how):
 
 
 def shown(path, stream='AUTO', z=-4.0, scalar=""):
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     reports.clear()
     objects = import_copc(path, stream)
     objects[0].patina.analysis = 'OFF'
     if scalar:
         objects[0].patina.colors.source, objects[0].patina.colors.scalar = 'SCALAR', scalar
-        clouds.CACHE.clear()  # the one with the file's colours
+        built.CACHE.clear()  # the one with the file's colours
     see(objects, z)
     return render()
 
@@ -92,7 +92,7 @@ def test_ept_on_a_server():
     folder, counts = tiles("served", 6000)
     wanted = shown(folder / "ept.json")
     for how in ("", "busy", "flaky"):
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         new_scene()
         reports.clear()
         with server(folder, how) as (address, asked), in_a_hurry():

@@ -13,9 +13,9 @@ import numpy as np
 from check_import import import_ply
 from check_linked import dense
 from harness import REPOSITORY, SCRATCH, Skip, add_points, check, forget_files, new_scene, render
-from patina import importers
 from patina.farm import task
-from patina.sync import clouds, linked
+from patina.read import importers
+from patina.sync.points import built, linked
 
 
 def pixels_of(path):
@@ -191,11 +191,11 @@ def test_farm_shares_built_clouds():
     try:
         source = linked.source_of(obj, 1, [])
         check(source.kept == shared, f"{source.kept}")
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         check((render()["Combined"] == whole).all(), "it looks different")
     finally:
         importers.steps = steps
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         aside.rename(own)
 
 

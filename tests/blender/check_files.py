@@ -9,7 +9,7 @@ import bpy
 from check_import import import_ply
 from check_linked import dense
 from harness import SCRATCH, check, new_scene, render, reports
-from patina.sync import files, linked
+from patina.sync.points import files, linked
 
 
 def places(name):

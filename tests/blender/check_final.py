@@ -10,10 +10,11 @@ from check_passes import dense_scene
 from check_points import pixel
 from harness import add_points, check, check_close, check_soon, new_scene, patina, render, set_world, sphere, stats, written
 from mathutils import Matrix, Vector
-from patina import engine, jobs, memory, native, options, viewport
-from patina import render as drawing
-from patina.sync import attributes, clouds
-from patina.sync.analyzing import ANALYSES
+from patina import jobs, memory, native, options
+from patina.draw import engine, viewport
+from patina.draw import render as drawing
+from patina.sync.analyses.analyzing import ANALYSES
+from patina.sync.points import attributes, built, taking
 
 
 def test_position():
@@ -133,26 +134,26 @@ def test_small_clouds_beside_each_other():
             place = (index % 8 - 3.5, index // 8 - 2, -9)
             obj = add_points(*sphere(400, 0.4, place), name=f"ball {index:02}")
             obj.patina.analysis = 'ALWAYS' if index % 2 else 'OFF'
-        clouds.CACHE.clear()
+        built.CACHE.clear()
 
     fill()
-    small, clouds.SMALL = clouds.SMALL, 0
+    small, taking.SMALL = taking.SMALL, 0
     run, waits = jobs.run, []
     jobs.run = lambda *arguments: (waits.append(1), run(*arguments))[1]
     try:
         alone = render()
         one_by_one = len(waits)
-        clouds.SMALL = small
-        clouds.CACHE.clear()
+        taking.SMALL = small
+        built.CACHE.clear()
         waits.clear()
         together = render()
     finally:
-        jobs.run, clouds.SMALL = run, small
+        jobs.run, taking.SMALL = run, small
     check(one_by_one >= 40 and len(waits) <= 4, f"{one_by_one} and {len(waits)} times the artist's Blender waited")
     for name, pixels in alone.items():
         check((pixels == together[name]).all(), f"{name} differs")
     check(any("40 small clouds" in text for text in stats), f"{stats}")
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     stopped, engine.PatinaRenderEngine._stopped = engine.PatinaRenderEngine._stopped, lambda self: True
     try:
         check(render() == {}, "a picture of a cancelled render")
@@ -247,8 +248,8 @@ def test_cancel_is_soon():
     scene.render.film_transparent = False
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    view = patina.engine.sync.final_view(scene.camera, depsgraph)
-    description = patina.engine.sync.describe(depsgraph, view, lambda what, progress: False)
+    view = patina.draw.engine.sync.final_view(scene.camera, depsgraph)
+    description = patina.draw.engine.sync.describe(depsgraph, view, lambda what, progress: False)
 
     def attempt():
         asked = []
@@ -277,13 +278,13 @@ def test_reading_may_be_cancelled():
                np.tile(normals, (count // 1000 + 1, 1))[:count])
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    view = patina.engine.sync.final_view(scene.camera, depsgraph)
+    view = patina.draw.engine.sync.final_view(scene.camera, depsgraph)
     gaps, asked, after = [], [], []
     original = attributes.opacities  # the last thing that is read
     attributes.opacities = lambda *arguments: after.append(1) or original(*arguments)
 
     def reading(stop_at):
-        patina.engine.sync.clouds.CACHE.clear()
+        patina.draw.engine.sync.points.built.CACHE.clear()
         asked.clear(), after.clear(), gaps.clear()
         last = time.perf_counter()
 
@@ -297,7 +298,7 @@ def test_reading_may_be_cancelled():
             return len(asked) == stop_at
 
         try:
-            patina.engine.sync.describe(depsgraph, view, poll)
+            patina.draw.engine.sync.describe(depsgraph, view, poll)
         except native.PatinaCancelled:
             return
         check(False, "was not cancelled")

@@ -15,8 +15,11 @@ import numpy as np
 from check_import import attribute_of, positions_of
 from check_import import import_ply as import_points
 from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, drawn, new_scene, points_of, render
-from patina import exporters, importers, native, readers
-from patina.importers import e57, las, pcd, reading, scans
+from patina import native
+from patina.read import importers, readers
+from patina.read.importers import e57, e57_scans, las, las_header, pcd, reading, scans
+from patina.sync.points import made, origin
+from patina.write import exporters
 
 DATA = REPOSITORY.parent / "shared/data"
 
@@ -102,12 +105,12 @@ def test_las_round_trip():
          "user_data": rng.integers(0, 256, 2000).astype(np.uint8), "gps_time": np.arange(2000, dtype=np.float32)}, (431000.0, 4581000.0, 2000.0), 0,
         {"crs": "PROJCS[\"somewhere\"]", "gps_time_start": 3e8})
     given = replace(points, scalars=dict(points.scalars))
-    obj = bpy.data.objects.new("scan", importers.to_data(given, cloud=False))
+    obj = bpy.data.objects.new("scan", made.to_data(given, cloud=False))
     check(not len(given.positions) and given.colors is None and not given.scalars, "the mesh takes the arrays over")
     kinds = {name: obj.data.attributes[name].data_type for name in points.scalars}
     check(kinds == {"intensity": 'FLOAT', "class": 'INT8', "user_data": 'FLOAT', "gps_time": 'FLOAT'}, f"{kinds}")
     check(".select_vert" not in obj.data.attributes, "a byte a point for the selection")
-    importers.origin.place(obj, points.origin, importers.origin.shared(bpy.context.scene, points.origin))
+    origin.place(obj, points.origin, origin.shared(bpy.context.scene, points.origin))
     bpy.context.scene.collection.objects.link(obj)
     obj.select_set(True)
     kept = points.positions.astype(np.float64) + points.origin
@@ -135,11 +138,11 @@ def test_export_by_name():
     """A script's exp.las is LAS without more words; in the dialog the one of name and format decides that was changed."""
     new_scene()
     add_points(np.zeros((7, 3))).select_set(True)
-    for name, options, made in (("named.las", {}, "named.las"), ("named.ply", {}, "named.ply"), ("plain", {}, "plain.ply"),
+    for name, options, written in (("named.las", {}, "named.las"), ("named.ply", {}, "named.ply"), ("plain", {}, "plain.ply"),
                                 ("again.LAS", {"kind": 'LAS'}, "again.LAS")):
         bpy.ops.export_scene.patina_points(filepath=str(SCRATCH / name), **options)
-        path = SCRATCH / made
-        check(path.read_bytes()[:4] == (b"LASF" if made.lower().endswith("las") else b"ply\n"), f"{name}: {made}")
+        path = SCRATCH / written
+        check(path.read_bytes()[:4] == (b"LASF" if written.lower().endswith("las") else b"ply\n"), f"{name}: {written}")
         path.unlink()
     from patina.operators.export_points import PATINA_OT_export_points as export_points
     dialog = SimpleNamespace(kind='PLY', _seen='PLY', filepath="/a/scan.ply")
@@ -256,7 +259,7 @@ def test_las_extra_dimensions():
     rows = [(1000 * i, 0, 0, 7, 0, 0, 2, 0, 0, 0, 5.0, 0.5 * i, 10 * i, -9999 if i == 1 else i, b"abc", 40 + i, (i, -i), (0, 0, 1))
             for i in range(3)]
     for behind in (False, True):
-        points = read_las(las_file("extra.las", 6, las._NEW + more, rows, extras, behind))
+        points = read_las(las_file("extra.las", 6, las_header._NEW + more, rows, extras, behind))
         found = points.scalars
         check_close(points.positions, [(0, 0, 0), (1, 0, 0), (2, 0, 0)], 1e-6, "positions")
         check_close(found["Curvature"], (0, 0.5, 1), 0, "a float")
@@ -266,14 +269,14 @@ def test_las_extra_dimensions():
         check_close(found["extra class"], (40, 41, 42), 0, "and the other stays beside it")
         check_close(found["pair 1"], (0, -1, -2), 0, "the second of a pair")
         check_close(points.normals, [(0, 0, 1)] * 3, 0, "normals")
-    points = read_las(las_file("plain.las", 6, las._NEW + more, rows))  # nobody says what the bytes are
+    points = read_las(las_file("plain.las", 6, las_header._NEW + more, rows))  # nobody says what the bytes are
     check(not {"Curvature", "height"} & points.scalars.keys(), f"{points.scalars.keys()}")
 
 
 def test_las_infrared():
     """Point formats 8 and 10, of which the latter has a waveform behind it."""
     for form in (8, 10):
-        fields = las._NEW + las._RGB + [("nir", "<u2")] + [("wave", "V29")] * (form == 10)
+        fields = las_header._NEW + las_header._RGB + [("nir", "<u2")] + [("wave", "V29")] * (form == 10)
         row = (1, 2, 3, 0, 0, 0, 2, 0, 0, 0, 5.0, 10, 20, 30, 777) + (b"w" * 29,) * (form == 10)
         points = read_las(las_file("nir.las", form, fields, [row] * 2))
         check_close(points.scalars["nir"], (777, 777), 0, f"format {form}")
@@ -283,7 +286,7 @@ def test_las_infrared():
 def test_las_absurd_times():
     """A time that cannot be one is none; the others keep their range."""
     times = (300000.5, np.nan, 300002.5, np.inf, -1e300, 1e300)
-    points = read_las(las_file("times.las", 6, las._NEW, [(1, 2, 3, 0, 0, 0, 2, 0, 0, 0, time) for time in times]))
+    points = read_las(las_file("times.las", 6, las_header._NEW, [(1, 2, 3, 0, 0, 0, 2, 0, 0, 0, time) for time in times]))
     check(points.notes["gps_time_start"] == 300000.5, f"{points.notes}")
     found = points.scalars["gps_time"]
     check_close(found[[0, 2]], (0, 2), 1e-6, "times")
@@ -327,7 +330,7 @@ def test_real_las():
     check(len(points_of(obj)) == 110000, f"{len(points_of(obj))} points")
     check(obj.data.attributes["Col"].data_type == 'BYTE_COLOR', "8-bit colours in 16 bits stay bytes")
     check({"intensity", "gps_time", "return_number"} <= set(obj.data.attributes.keys()), f"{obj.data.attributes.keys()}")
-    header = las.read_header(path)
+    header = las_header.read_header(path)
     places = np.array(obj["patina_origin"]) + positions_of(obj) - np.array(obj.matrix_world.translation)
     check_close(places.min(axis=0), header.lower, 0.01, "lower corner")
     check_close(places.max(axis=0), header.upper, 0.01, "upper corner")
@@ -619,7 +622,7 @@ def test_e57_in_steps():
         import pye57
     except ImportError:
         raise Skip("pye57 is not installed here") from None
-    size, e57.SMALL_PIECE = e57.SMALL_PIECE, 500
+    size, e57_scans.SMALL_PIECE = e57_scans.SMALL_PIECE, 500
     try:
         for name in ("libE57Format/bunnyDouble.e57", "libE57Format/ColouredCubeFloat.e57", "pdal/A_B.e57",
                      "pye57/translationWithoutRotation.e57"):
@@ -632,7 +635,7 @@ def test_e57_in_steps():
             file.close()
             check_close(points.positions.astype(np.float64) + points.origin, wanted, 2e-4, name)
     finally:
-        e57.SMALL_PIECE = size
+        e57_scans.SMALL_PIECE = size
 
 
 def e57_file(name, *scans):

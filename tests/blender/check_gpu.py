@@ -9,9 +9,9 @@ import gpu
 import numpy as np
 from harness import Skip, check, check_close
 from mathutils import Matrix
-from patina import graphics, painting, sky
-from patina.sync import world_image
-from patina.sync.world_nodes import Picture
+from patina.draw import graphics, painting, sky
+from patina.sync.lighting import world_image
+from patina.sync.lighting.world_nodes import Picture
 
 WIDTH, HEIGHT = 48, 36
 

@@ -7,7 +7,8 @@ import numpy as np
 from check_formats import range_image, text_file
 from check_import import import_ply
 from harness import add_points, check, new_scene, render, reports, sphere
-from patina.sync import analysis, clouds
+from patina.sync.analyses import analysis
+from patina.sync.points import built
 
 APART = 0.03
 
@@ -119,4 +120,4 @@ def test_pictures_by_grid():
 
 def only_kinds():
     """Of the cloud of the last picture."""
-    return list(clouds.CACHE._entries.values())[-1][1].kinds
+    return list(built.CACHE._entries.values())[-1][1].kinds

@@ -11,13 +11,13 @@ import numpy as np
 from check_import import import_ply
 from check_linked import dense
 from harness import SCRATCH, check, new_scene, patina, render
-from patina.importers import library
-from patina.sync import clouds, kept, linked
+from patina.read.importers import library
+from patina.sync.points import built, kept, linked
 
 
 def forget():
     """As a new session."""
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     kept.CHECKS.clear()
     kept.CHECKS._seen.clear()
 

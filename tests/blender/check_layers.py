@@ -6,7 +6,7 @@ import numpy as np
 from check_passes import dense_scene
 from check_points import grid, pixel
 from harness import add_points, check, check_close, drawn, linear, new_scene, patina, render, reports, stats
-from patina.sync import estimates
+from patina.sync.analyses import estimates
 
 RED, GREEN = (200, 60, 40), (30, 180, 90)
 DEEPER = 12  # times as far: farther behind than twice the spacing of the points

@@ -120,7 +120,8 @@ def test_tiles_and_border():
 
 
 def test_viewport_scales_lines():
-    from patina import pace, sync, viewport
+    from patina import sync
+    from patina.draw import pace, viewport
     scene = stage(width=6.0)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     view = sync.final_view(scene.camera.evaluated_get(depsgraph), depsgraph)

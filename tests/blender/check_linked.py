@@ -11,9 +11,9 @@ import numpy as np
 from check_import import columns, import_ply, write_ply
 from harness import SCRATCH, check, check_close, new_scene, patina, points_of, render, reports, stats
 from mathutils import Matrix
-from patina import native, preferences
-from patina.importers import las, library
-from patina.sync import cache, clouds, linked
+from patina import choices, native
+from patina.read.importers import las, library
+from patina.sync.points import built, cache, linked
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
 
@@ -70,7 +70,7 @@ def test_opens_from_its_cache():
 
 def saved(name, like, origin=(0.0, 0.0, 0.0)):
     """A saved cloud of a file's points, as the command line makes it; so far away."""
-    found = library.read(like, patina.importers.Filter(), patina.importers.Progress())
+    found = library.read(like, patina.read.importers.Filter(), patina.read.importers.Progress())
     path = SCRATCH / name
     origin = tuple(own + more for own, more in zip(found.origin, origin, strict=True))
     native.Cloud(found.positions, found.normals, found.colors, origin=origin).start_save(path).result()
@@ -138,7 +138,7 @@ def test_saved_clouds_that_are_none():
             check("can only be linked" in str(error), str(error))
         else:
             raise AssertionError(f"{operator} reads it")
-    check("100 points" in patina.importers.preview(SCRATCH / "good.cloud")[1], "the file dialog's preview")
+    check("100 points" in patina.read.importers.preview(SCRATCH / "good.cloud")[1], "the file dialog's preview")
 
 
 def test_saved_clouds_among_kept_ones():
@@ -147,12 +147,12 @@ def test_saved_clouds_among_kept_ones():
     beside = [good, SCRATCH / "town.json", SCRATCH / "town.scan", SCRATCH / "town-packed.cloud"]
     for path in beside[1:]:
         path.write_text("{}")
-    most, preferences.cache_bytes = preferences.cache_bytes, lambda: 0
+    most, choices.cache_bytes = choices.cache_bytes, lambda: 0
     try:
         for name in ("first.ply", "second.ply"):
             linked.load(linked.source(dense(name, 5000)))
     finally:
-        preferences.cache_bytes = most
+        choices.cache_bytes = most
     check(not linked.source(SCRATCH / "first.ply").kept.exists() and linked.source(SCRATCH / "second.ply").kept.exists(), "nothing is let go")
     cache.clear()
     check(not linked.source(SCRATCH / "second.ply").kept.exists() and all(path.exists() for path in beside), f"{list(map(Path.exists, beside))}")
@@ -192,8 +192,8 @@ def test_file_that_is_cut_short():
     new_scene()
     path = saved("cut.cloud", dense("cut.ply", 60000))
     import_ply(path, link=True)
-    clouds.CACHE.clear()
-    first, (cloud,) = render(), [cloud for _, cloud in clouds.CACHE._entries.values()]
+    built.CACHE.clear()
+    first, (cloud,) = render(), [cloud for _, cloud in built.CACHE._entries.values()]
     whole, status, before = path.read_bytes(), path.stat(), native.losses()
     os.truncate(path, len(whole) // 3)
     with native.Device("cpu") as device, native.Scene() as scene, native.Frame(device) as frame:
@@ -229,7 +229,7 @@ def test_to_mesh_and_back():
     before = np.array([vertex.co for vertex in obj.data.vertices]) + place
     bpy.ops.object.patina_mesh_to_linked(filepath=str(SCRATCH / "back.ply"))
     check(len(obj.data.vertices) == 8 and obj.patina.linked_file.endswith("back.ply"), "not linked")
-    file = library.read(SCRATCH / "back.ply", patina.importers.Filter(), patina.importers.Progress())
+    file = library.read(SCRATCH / "back.ply", patina.read.importers.Filter(), patina.read.importers.Progress())
     check_close(file.positions.astype(np.float64) + file.origin, before, 1e-4, "positions")
     check("intensity" in file.scalars and file.normals is not None and file.colors is not None, f"{list(file.scalars)}")
 
@@ -237,11 +237,11 @@ def test_to_mesh_and_back():
 def test_cancel_while_reading():
     """A wish to stop reaches the reader of a linked file, which leaves nothing half behind."""
     path = dense("slow.ply", 200000)
-    progress = patina.importers.Progress()
+    progress = patina.read.importers.Progress()
     progress.cancel()
     try:
         linked.load(linked.source(path), progress)
-    except patina.importers.PatinaError as error:
+    except patina.read.importers.PatinaError as error:
         check(error.code == -7, str(error))
     else:
         check(False, "a cancelled file was read")
@@ -252,17 +252,17 @@ def test_cancel_while_reading():
 def test_reading_in_steps():
     """A file that changed is read in tasks, or in short pieces: nobody waits for it, and who loses interest just stops."""
     path = dense("steps.ply", 50000)
-    kinds = [type(step).__name__ for step in linked.steps(linked.source(path), patina.importers.Progress())]
+    kinds = [type(step).__name__ for step in linked.steps(linked.source(path), patina.read.importers.Progress())]
     check(kinds == ["Task"] * 4, f"PLY: {kinds}")  # open, build, analyze, save
     import_ply(path)
     points = SCRATCH / "steps.las"
     bpy.ops.export_scene.patina_points(overwrite=True, filepath=str(points), kind='LAS')
     piece, las.SMALL_PIECE = las.SMALL_PIECE, 10000
     try:
-        kinds = [type(step).__name__ for step in linked.steps(linked.source(points), patina.importers.Progress())]
+        kinds = [type(step).__name__ for step in linked.steps(linked.source(points), patina.read.importers.Progress())]
         check(kinds == ["Pause"] * 5 + ["Task"] * 3, f"LAS: {kinds}")
         os.utime(points, (1, 1))
-        given_up = linked.steps(linked.source(points), patina.importers.Progress())
+        given_up = linked.steps(linked.source(points), patina.read.importers.Progress())
         next(given_up)
         given_up.close()
     finally:

@@ -6,7 +6,7 @@ import numpy as np
 from check_points import grid, mesh_to_points, pixel
 from check_splats import size_of
 from harness import add_points, check, check_close, drawn, new_scene, render, reports
-from patina.sync import clouds
+from patina.sync.points import clouds, taking
 
 
 def test_vertex_groups_as_opacity():
@@ -108,7 +108,7 @@ def test_materials_of_geometry_nodes():
     picture = render()["Combined"]
     for number, point in enumerate(points):
         check_close(picture[pixel(scene, point)][:3], (0.1, 0.2, 0.8) if number < 6 else (0.7, 0.1, 0.05), 1e-5, f"point {number}")
-    items = clouds.collect(bpy.context.evaluated_depsgraph_get(), clouds.Trusted().take([]), [])
+    items = clouds.collect(bpy.context.evaluated_depsgraph_get(), taking.Trusted().take([]), [])
     check(len(items) == 2 and items[0].cloud is not items[1].cloud, "in a viewport each has its own points too")
     blue.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.0, 0.9, 0.0, 1)
     check_close(render()["Combined"][pixel(scene, points[0])][:3], (0, 0.9, 0), 1e-5, "a material that changed")

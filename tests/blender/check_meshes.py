@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 from harness import add_light, add_points, check, check_close, new_scene, render, sphere
-from patina.sync import meshes
+from patina.sync.objects import meshes
 
 
 def plane(z, half, color=None, name="plane"):

@@ -3,7 +3,7 @@
 
 import numpy as np
 from harness import add_points, check, check_close, new_scene, render, reports
-from patina.sync import motion
+from patina.sync.view import motion
 
 SIZE, SCALE = 64, 8  # pixels, and pixels a unit
 

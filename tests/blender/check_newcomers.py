@@ -9,8 +9,8 @@ from check_import import columns, import_ply, write_ply
 from check_panorama import stage
 from check_points import mesh_to_points
 from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, patina, points_of, render, reports, sphere
-from patina.importers import crs, library
 from patina.operators import points_keys
+from patina.read.importers import crs, library
 
 LAMBERT = ('PROJCS["NAD_1983_HARN_Lambert_Conformal_Conic",GEOGCS["GCS_North_American_1983_HARN",UNIT["Degree",0.0174532925199433],'
            'AUTHORITY["EPSG","4152"]],UNIT["Foot",0.3048],AUTHORITY["EPSG","2993"]]')
@@ -146,7 +146,7 @@ def test_columns_of_words_are_left_out():
     for name, text, column in (("excel.csv", "\ufeffPunkt;X;Y;Z;Note\r\nP 1;1,5;2;3;\r\nP 2;4;5;6;\"a; tree\"\r\n", "'Punkt'"),
                                ("station.txt", "P1 1.5 2 3\nP2 4 5 6\n", "column 1")):
         (SCRATCH / name).write_text(text, encoding="utf-8")
-        found = library.read(SCRATCH / name, patina.importers.Filter(), patina.importers.Progress())
+        found = library.read(SCRATCH / name, patina.read.importers.Filter(), patina.read.importers.Progress())
         check_close(found.positions + np.array(found.origin), [(1.5, 2, 3), (4, 5, 6)], 1e-5, name)
         check(not found.scalars and any(column in warning and "left out" in warning for warning in found.warnings), f"{found.warnings}")
         obj, = import_ply(SCRATCH / name)

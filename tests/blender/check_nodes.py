@@ -8,7 +8,7 @@ from check_points import grid, node_tree, pixel, stats_line
 from check_splats import size_of
 from harness import Skip, add_points, check, check_close, drawn, linear, new_scene, render, reports
 from mathutils import Matrix
-from patina.sync import clouds
+from patina.sync.points import clouds, taking
 
 
 class Nodes:
@@ -149,7 +149,7 @@ def test_nodes_instances():
         for row in wanted:
             for number, place in enumerate(row):
                 check_close(picture["Combined"][place][:3], np.eye(3)[number], 2e-6, f"realized {realize}: color {number}")
-        items = [item for item in clouds.collect(bpy.context.evaluated_depsgraph_get(), clouds.Trusted().take([]), []) if item.name != "small"]
+        items = [item for item in clouds.collect(bpy.context.evaluated_depsgraph_get(), taking.Trusted().take([]), []) if item.name != "small"]
         check(len(items) == (1 if realize else 3) and len({id(item.cloud) for item in items}) == 1, f"realized {realize}: {len(items)} clouds")
         obj.location.x += 0.1
         moved = {pixel(scene, place + np.array(TURNED.to_3x3()) @ point + [0.1, 0, 0]) for place in PLACES for point in SMALL}

@@ -10,7 +10,8 @@ import numpy as np
 import screen
 from harness import add_points, check, sphere
 from mathutils import Quaternion
-from patina import point_data, viewport
+from patina import point_data
+from patina.draw import viewport
 from window import area, setup, view, window_region
 
 DARK = 40  # of 255: no channel of points and background is below 140

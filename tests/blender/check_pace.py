@@ -2,7 +2,7 @@
 """How much is drawn while the view moves: plain arithmetic, on machines that are made up here."""
 
 from harness import check
-from patina import pace
+from patina.draw import pace
 
 
 def took(level, points, pixels):

@@ -15,10 +15,11 @@ from check_copc import in_a_hurry, made, open_address, see, server, stream_of
 from check_ept import equal, shown, tiles
 from check_preferences import enabled
 from harness import SCRATCH, check, new_scene, render, reports
-from patina import preferences, programs
+from patina import choices, preferences
 from patina.operators import preferences as operators
-from patina.streaming import shelf
-from patina.sync import addresses, cache, clouds
+from patina.read import programs
+from patina.read.streaming import shelf
+from patina.sync.points import addresses, built, cache
 from range_server import NOTHING
 
 FOLDER = SCRATCH / "pages kept"
@@ -36,7 +37,7 @@ def keeping(what='ADDRESSES', folder=FOLDER):
 
 def opened(address):
     """The picture of a new session."""
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     new_scene()
     reports.clear()
     see([open_address(address)])
@@ -105,7 +106,7 @@ def test_changed_file_on_the_server():
             second, new = opened(address), kept_files()
             check(not reports and len(asked) > before + 4, f"{how}: {reports} {asked[before:]}")
             check(not any(place.exists() for place in old) and new, f"{how}: the old ones stay")
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         equal(shown(path, 'ON'), second, how)
         check(any((pixels != second[name]).any() for name, pixels in first.items()), f"{how}: nothing changed")
 
@@ -115,7 +116,7 @@ def test_file_changes_while_it_is_shown():
     for how in ("etag", "dated"):
         made("while.copc.laz", POINTS)
         with keeping(), server(path, how) as (address, _):
-            clouds.CACHE.clear()
+            built.CACHE.clear()
             new_scene()
             reports.clear()
             see([open_address(address)])
@@ -166,7 +167,7 @@ def test_garbage_is_not_kept():
             path.write_bytes(good)
             found = opened(address)
             check(not reports, f"{reports}")
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         equal(shown(path, 'ON'), found, "garbage")
 
 
@@ -244,7 +245,7 @@ def test_no_more_than_the_cap():
         whole = opened(address)
         size = sum(size for _, size, _ in shelf.files(FOLDER))
         shutil.rmtree(FOLDER)
-        with mock.patch.object(preferences, "GIGA", size // 3):
+        with mock.patch.object(choices, "GIGA", size // 3):
             chosen.pages_limit = 1
             equal(whole, opened(address), "capped")
             held = sum(size for _, size, _ in shelf.files(FOLDER))

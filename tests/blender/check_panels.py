@@ -261,7 +261,7 @@ def test_combine_has_a_panel():
     surface = drawn_by(bpy.types.PATINA_PT_surface, context_of())
     check(not any(name == "scene.patina_combine" for _, _, name, _ in surface), "it is in Surface too")
     points = scene.copy()
-    points[patina.pairs.MARK] = scene
+    points[patina.sync.view.pairs.MARK] = scene
     scene.render.engine = 'BLENDER_WORKBENCH'
     try:
         check(operators() == ["scene.patina_other"], f"{operators()}")

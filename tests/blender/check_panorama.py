@@ -11,9 +11,9 @@ from check_import import import_ply as import_points
 from check_motion import make_linear
 from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, new_scene, render, sphere
 from mathutils import Euler
-from patina import importers
 from patina.operators import scanner
-from patina.sync.analysis import SCANNERS
+from patina.read import importers
+from patina.sync.analyses.analysis import SCANNERS
 
 EYE = (3.0, -2.0, 1.0)
 

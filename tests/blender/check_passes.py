@@ -20,7 +20,7 @@ from harness import (
     stats,
 )
 from mathutils import Matrix, Vector
-from patina import sample
+from patina.draw import sample
 
 
 def dense_scene(width=96, height=72):

@@ -13,8 +13,9 @@ import numpy as np
 from check_import import columns, import_ply, positions_of, values, write_ply
 from harness import SCRATCH, add_points, check, check_close, failing_render, new_scene, points_of, render, reports, sphere
 from mathutils import Vector
-from patina.importers import crs, las, library, origin
-from patina.importers.reading import Filter, Progress
+from patina.read.importers import crs, las, library
+from patina.read.importers.reading import Filter, Progress
+from patina.sync.points import origin
 
 FAR_AWAY = (485432.0, 5428765.0, 312.0)
 MATCHING = (485532.5, 5428700.0, 300.0)

@@ -6,7 +6,7 @@ import numpy as np
 from check_camera import to_pixels
 from harness import Skip, add_points, check, check_close, drawn, linear, move, new_scene, patina, points_of, render, reports, sphere
 from mathutils import Euler, Matrix
-from patina.sync import attributes, clouds
+from patina.sync.points import attributes, built
 
 
 def pixel(scene, point):
@@ -156,7 +156,7 @@ def test_collection_instances():
     picture = render()
     wanted = {pixel(scene, (-0.35, 0.02, -2)), pixel(scene, (0.3, 0.26, -2))}
     check(drawn(picture) == wanted, f"{drawn(picture)} is not {wanted}")
-    check(len(clouds.CACHE) >= 1 and "2 points" in stats_line(), f"statistics {stats_line()}")
+    check(len(built.CACHE) >= 1 and "2 points" in stats_line(), f"statistics {stats_line()}")
 
 
 def stats_line():
@@ -340,31 +340,31 @@ def test_invalid_positions():
 def test_cache():
     """Unchanged points are not built again; changed ones are; another file empties the cache."""
     new_scene()
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     obj = add_points(*sphere(500))
-    built = []
-    original = clouds.native.Cloud
+    builds = []
+    original = built.native.Cloud
 
     class Counting(original):
         @classmethod
         def start(cls, *arguments, **named):
-            built.append(1)
+            builds.append(1)
             return original.start(*arguments, **named)
 
-    clouds.native.Cloud = Counting
+    built.native.Cloud = Counting
     try:
         first = render()["Combined"]
         second = render()["Combined"]
-        check(len(built) == 1, f"{len(built)} builds for two renders")
+        check(len(builds) == 1, f"{len(builds)} builds for two renders")
         check(np.array_equal(first, second), "two renders differ")
         obj.location.x = 0.3
         render()
-        check(len(built) == 1, "moving an object rebuilt its cloud")
+        check(len(builds) == 1, "moving an object rebuilt its cloud")
         move(obj, 7, points_of(obj)[7] + (0.5, 0.0, 0.0))
         render()
-        check(len(built) == 2, "changed points were not rebuilt")
+        check(len(builds) == 2, "changed points were not rebuilt")
     finally:
-        clouds.native.Cloud = original
+        built.native.Cloud = original
     check(patina._forget in bpy.app.handlers.load_pre, "the load_pre handler")
     patina._forget()
-    check(len(clouds.CACHE) == 0, "the cache is empty for another file")
+    check(len(built.CACHE) == 0, "the cache is empty for another file")

@@ -19,9 +19,12 @@ from check_import import import_ply
 from check_linked import dense
 from check_panels import Row, context_of, drawn_by
 from harness import REPOSITORY, SCRATCH, Skip, check, new_scene, render
-from patina import importers, memory, native, preferences, readers, tested, versions
+from patina import choices, memory, native, preferences, tested, versions
+from patina.description.settings import DeviceChoice
 from patina.operators import preferences as operators
-from patina.sync import cache, kept, linked, settings
+from patina.read import importers, readers
+from patina.sync.points import cache, kept, linked
+from patina.sync.view import settings
 
 FOLDER = SCRATCH / "readers" / readers.TAG
 
@@ -32,7 +35,7 @@ def enabled():
     addon = bpy.context.preferences.addons.new()
     addon.module = "patina"
     try:
-        yield preferences.get()
+        yield choices.get()
     finally:
         bpy.context.preferences.addons.remove(addon)
         memory.limit = 0
@@ -49,13 +52,13 @@ def without_readers(*wanted):
     are not imported within, and come back whole."""
     known = {name: sys.modules.pop(name) for name in modules_of(wanted)}
     packages, readers.PACKAGES = readers.PACKAGES, dict.fromkeys(wanted, "tests")
-    place, preferences.readers_folder = preferences.readers_folder, lambda: FOLDER
+    place, choices.readers_folder = choices.readers_folder, lambda: FOLDER
     shutil.rmtree(FOLDER, ignore_errors=True)
     try:
         yield
     finally:
         readers.look_no_more_in(FOLDER)
-        readers.PACKAGES, preferences.readers_folder = packages, place
+        readers.PACKAGES, choices.readers_folder = packages, place
         for name in modules_of(wanted):
             del sys.modules[name]
         sys.modules.update(known)
@@ -94,7 +97,7 @@ def test_readers_from_files():
         readers.look_no_more_in(FOLDER)
         sys.modules.pop("patina_try_a")
         check(len(readers.missing()) == 2, "not where Python looks by itself")
-        readers.look_in(preferences.readers_folder())  # as register() does
+        readers.look_in(choices.readers_folder())  # as register() does
         check(not readers.missing(), "lost by the next start")
 
 
@@ -112,7 +115,7 @@ def test_real_readers_from_files():
             archive.write(item, item.relative_to(source))
     code = ("import sys, types; from pathlib import Path\n"
             f"alone = types.ModuleType('alone'); alone.__path__ = [{str(REPOSITORY / 'addon')!r}]; sys.modules['alone'] = alone\n"
-            "import alone.readers as m\n"
+            "import alone.read.readers as m\n"
             f"assert 'laspy' in m.missing(); list(m.install([Path({str(path)!r})], Path({str(FOLDER)!r})))\n"
             "import laspy, lazrs; assert laspy.LazBackend.Lazrs.is_available(); print('READY', laspy.__file__)")
     import numpy
@@ -272,21 +275,21 @@ def test_cache_folder_size_and_clear():
         bpy.ops.patina.clear_cache()
         check((mine / "mine.txt").is_file(), "somebody else's file is gone")
         chosen.cache_limit = 1
-        check(preferences.cache_bytes() == 1 << 30, "the limit")
-    check(kept.folder() != mine and preferences.cache_bytes() == 32 << 30, "defaults hold without")
+        check(choices.cache_bytes() == 1 << 30, "the limit")
+    check(kept.folder() != mine and choices.cache_bytes() == 32 << 30, "defaults hold without")
     check(linked.source(SCRATCH / "kept.ply").kept.parent != mine, "linked clouds follow")
 
 
 def test_defaults_of_device_threads_and_memory():
     scene = new_scene()
     scene.patina.device, scene.patina.threads, scene.render.threads_mode = 'AUTO', 0, 'AUTO'
-    check(settings.device(scene) == settings.DeviceChoice("auto", 0), "without preferences")
+    check(settings.device(scene) == DeviceChoice("auto", 0), "without preferences")
     with enabled() as chosen:
         chosen.device, chosen.threads, chosen.memory_limit = 'CPU', 3, 2
-        check(settings.device(scene) == settings.DeviceChoice("cpu", 3), f"{settings.device(scene)}")
+        check(settings.device(scene) == DeviceChoice("cpu", 3), f"{settings.device(scene)}")
         check(memory.for_planes() == 2 << 30, f"{memory.for_planes()}")
         scene.patina.device, scene.patina.threads = 'CPU_SCALAR', 2
-        check(settings.device(scene) == settings.DeviceChoice("cpu-scalar", 2), "the scene's own come first")
+        check(settings.device(scene) == DeviceChoice("cpu-scalar", 2), "the scene's own come first")
         chosen.cloud_limit = 3
         check(settings.device(scene).mapped == 3 << 30, f"{settings.device(scene)}")
         with native.Device("cpu", mapped=1 << 30) as device:

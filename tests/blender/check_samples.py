@@ -7,8 +7,9 @@ import threading
 import numpy as np
 from check_motion import stage
 from harness import add_points, check, new_scene, render, reports, sphere, stats
-from patina import engine, jobs
-from patina import render as drawing
+from patina import jobs
+from patina.draw import engine
+from patina.draw import render as drawing
 
 _described: list[tuple] = []
 

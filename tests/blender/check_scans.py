@@ -332,8 +332,8 @@ def test_ptx_is_range_images():
 
 def test_bad_scans_of_ptx():
     """A matrix that is no rotation, a scan of no points, of one, and one that ends before its grid does are named, and the others shown."""
-    from patina import importers
-    from patina.importers import scans
+    from patina.read import importers
+    from patina.read.importers import scans
     bent = "1 0 0 0\n0 3 0 0\n0 0 0 0\n"
     lone = ptx_scan((0, 0, 0), 1, 2)
     path = text_file("bad.ptx", ptx_scan((0, 0, 0), 17, 17) + ptx_scan((3, 0, 0), 4, 4, turn=bent) + ptx_scan((4, 0, 0), 1, 1) + lone +
@@ -352,7 +352,7 @@ def test_bad_scans_of_ptx():
 
 
 def told_of(obj):
-    from patina.importers import scans
+    from patina.read.importers import scans
     return scans.unpacked(obj.data.get("patina_scans")), np.array(obj.data.get("patina_scanners", [])).reshape(-1, 3)
 
 
@@ -372,7 +372,7 @@ def check_told(got, wanted, what):
 def test_scans_survive_linking():
     """Converted to a linked cloud, saved, opened again without what was kept, and converted back, scans keep numbers, names, poses,
     directions, intervals and grids; they are listed and culled as before, and stations come with an import of the written file."""
-    from patina.sync import clouds, linked
+    from patina.sync.points import built, linked
     obj = pair(False, "survive")
     group = obj.patina.ranges
     group.use, group.use_cull = True, True
@@ -389,7 +389,7 @@ def test_scans_survive_linking():
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     for kept in linked.source(path).kept.parent.glob(linked.source(path).kept.name.split("-")[0] + "*"):
         kept.unlink()
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     obj = bpy.data.objects["survive"]
     bpy.context.view_layer.objects.active = obj

@@ -13,8 +13,9 @@ from unittest import mock
 import bpy
 import numpy as np
 from harness import SCRATCH, add_points, check, forget_files, new_scene, patina, render, sphere
-from patina import readers, styles
-from patina.sync import addresses, clouds, kept
+from patina.read import readers
+from patina.styles import styles
+from patina.sync.points import addresses, built, kept
 
 FOLDER = SCRATCH / "strangers"
 MARK = FOLDER / "it-ran"
@@ -109,7 +110,7 @@ def hostile_blend():
 def test_a_blend_runs_and_writes_nothing():
     path = hostile_blend()
     before = files(FOLDER)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     with recorded() as events, mock.patch.object(addresses, "online", lambda: False):
         bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
         try:
@@ -138,7 +139,7 @@ def test_a_packed_scan_goes_to_the_cache():
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "packed.blend"), check_existing=False)
     scan.unlink()
     before = files(FOLDER)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     with recorded() as events:
         bpy.ops.wm.open_mainfile(filepath=str(folder / "packed.blend"), load_ui=False)
         picture = render()
@@ -185,7 +186,7 @@ def test_a_cloud_is_data():
     for path in sorted(folder.iterdir()):
         for link in (False, True):
             new_scene(32, 24)
-            clouds.CACHE.clear()
+            built.CACHE.clear()
             with recorded() as events:
                 bpy.ops.import_scene.patina_points(filepath=str(path), link=link)
                 render()

@@ -6,7 +6,7 @@ import check_linked  # noqa: F401  no test leaves files with the user
 import numpy as np
 from check_import import write_ply
 from harness import SCRATCH, add_points, check, check_close, new_scene, render, reports, set_world
-from patina.sync import clouds, linked, sequence
+from patina.sync.points import built, linked, sequence
 
 SIZE = 64
 
@@ -87,19 +87,19 @@ def test_one_origin():
 def test_recent_clouds_stay():
     """Clouds of other frames stay within a budget; the picture's own always."""
     link(scans("recent", range(1, 6)))
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     shown(1)
-    one = next(iter(clouds.CACHE._entries.values()))[1].footprint
-    budget, clouds.IDLE_BYTES = clouds.IDLE_BYTES, 2 * one
+    one = next(iter(built.CACHE._entries.values()))[1].footprint
+    budget, built.IDLE_BYTES = built.IDLE_BYTES, 2 * one
     try:
         for frame in range(1, 6):
             check(shown(frame) == frame, f"frame {frame}")
-        kept = list(clouds.CACHE._entries)
+        kept = list(built.CACHE._entries)
         check(len(kept) == 3 and kept[-1][1].endswith("scan_0005.ply"), f"{kept}")
-        cloud = clouds.CACHE._entries[kept[0]][1]
-        check(shown(3) == 3 and clouds.CACHE._entries[kept[0]][1] is cloud, "a kept cloud is opened again")
+        cloud = built.CACHE._entries[kept[0]][1]
+        check(shown(3) == 3 and built.CACHE._entries[kept[0]][1] is cloud, "a kept cloud is opened again")
     finally:
-        clouds.IDLE_BYTES = budget
+        built.IDLE_BYTES = budget
 
 
 def test_patterns():

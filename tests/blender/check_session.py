@@ -9,8 +9,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 from harness import Skip, add_points, check, check_soon, drawn, failing_render, new_scene, patina, render, reports, sphere
-from patina import engine, jobs, native, passes
-from patina import render as drawing
+from patina import jobs, native
+from patina.draw import engine, passes
+from patina.draw import render as drawing
 
 
 def test_break_writes_nothing():

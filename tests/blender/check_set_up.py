@@ -186,8 +186,8 @@ def test_import_frames_the_points():
 
 
 def test_names_without_copc():
-    from patina.importers import las
-    from patina.importers.reading import Filter, Progress
+    from patina.read.importers import las
+    from patina.read.importers.reading import Filter, Progress
     plain = las_file("plain.las", np.random.default_rng(1).uniform(0, 1, (50, 3)))
     path = SCRATCH / "harbor.copc.las"
     path.write_bytes(plain.read_bytes())

@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 from check_points import pixel
 from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, reports
-from patina import histogram, point_data
+from patina import point_data
+from patina.draw import histogram
 
 COUNT = 9
 
@@ -268,14 +269,14 @@ def test_viewport_takes_what_was_painted():
     _, obj, _ = row()
     obj.data.attributes.new("score", 'FLOAT', 'POINT').data.foreach_set("value", np.linspace(0.0, 1.0, COUNT, dtype=np.float32))
     by(obj, 'ATTRIBUTE', attribute="score")
-    clouds, trusted = patina.sync.clouds, patina.sync.Trusted()
+    clouds, trusted = patina.sync.points.clouds, patina.sync.Trusted()
 
     def taken():
         notices = []
         graph = bpy.context.evaluated_depsgraph_get()
         item, = clouds.collect(graph, trusted.take(notices), notices)
         cloud = patina.jobs.finish(item.cloud.resolve(patina.native.Progress()))
-        return item, cloud, patina.sync.soft.field_of(cloud, item.soft)
+        return item, cloud, patina.sync.points.soft.field_of(cloud, item.soft)
 
     item, cloud, field = taken()
     check(taken()[2] is field and trusted.reads == 1, "nothing is read or made anew")

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from check_soft import by
 from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, reports
-from patina import styles
+from patina.styles import styles
 
 RED, BLUE = (220, 40, 40, 255), (40, 60, 220, 255)
 

@@ -8,8 +8,9 @@ import numpy as np
 from check_import import import_ply, write_ply
 from check_points import grid, pixel
 from harness import SCRATCH, Skip, add_points, check, check_close, drawn, linear, move, new_scene, render, reports
-from patina import importers, point_data
-from patina.sync import attributes, splats
+from patina import point_data
+from patina.read import importers
+from patina.sync.points import attributes, splats
 
 COLOR = (200, 60, 40)
 

@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, render, reports, set_world, sphere
 from mathutils import Matrix
-from patina import sample, styles, thumbnails
+from patina.draw import sample, thumbnails
+from patina.styles import styles
 
 OWN = SCRATCH / "scripts"  # not the user's
 OWN.mkdir(exist_ok=True)

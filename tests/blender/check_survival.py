@@ -19,8 +19,9 @@ from check_kept import forget
 from check_linked import dense
 from check_preferences import enabled
 from harness import SCRATCH, Skip, check, forget_files, new_scene, render
-from patina import importers, styles
-from patina.sync import edits, files, linked
+from patina.read import importers
+from patina.styles import styles
+from patina.sync.points import edits, files, linked
 
 
 @contextmanager

@@ -4,8 +4,10 @@
 import bpy
 import numpy as np
 from harness import SCRATCH, Skip, add_light, add_points, check, check_close, linear, new_scene, render, reports, saved, set_world, sphere
-from patina import sync, viewport
-from patina.sync import clouds, images
+from patina import sync
+from patina.draw import viewport
+from patina.sync.objects import images
+from patina.sync.points import clouds, taking
 
 SIZE = 96
 
@@ -316,7 +318,7 @@ def test_viewport_follows():
     told = []
 
     def listen(_scene, depsgraph):
-        told.append(clouds.changed_owners(depsgraph))
+        told.append(taking.changed_owners(depsgraph))
 
     depsgraph = bpy.context.evaluated_depsgraph_get()
     bpy.app.handlers.depsgraph_update_post.append(listen)

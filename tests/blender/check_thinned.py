@@ -8,8 +8,10 @@ import bpy
 import numpy as np
 import screen
 from harness import add_points, check, sphere
-from patina import importers, point_data, preferences, thinned
-from patina.importers import PointFile
+from patina import choices, point_data
+from patina.draw import thinned
+from patina.read.importers import PointFile
+from patina.sync.points import made
 from window import area, keep, pause, setup, window_region
 
 COLOR = (210, 60, 40, 255)
@@ -30,7 +32,7 @@ def seen(name="", color=COLOR):
 def given(cloud, count=120_000, color=COLOR, center=(0, 0, 0)):
     positions, _, normals = sphere(count, 1.5, center)
     points = PointFile("scan", positions.astype(np.float32), normals.astype(np.float32), np.tile(np.uint8(color), (count, 1)), {}, (0.0, 0.0, 0.0), 0, {})
-    obj = bpy.data.objects.new("scan", importers.to_data(points, cloud))
+    obj = bpy.data.objects.new("scan", made.to_data(points, cloud))
     bpy.context.scene.collection.objects.link(obj)
     return obj
 
@@ -55,7 +57,7 @@ def test_thinned_colors_in_solid():
                 counts[kind, selected] = seen(f"{kind} {obj.type} {selected}")
         check(min(counts.values()) > 60_000, f"{obj.type}: pixels in the cloud's color: {counts}")
         parts = [part for part in thinned._parts.values() if part]
-        check(len(parts) == 1 and len(parts[0].places) == preferences.PREVIEW_POINTS, f"{[len(part.places) for part in parts]} points are shown")
+        check(len(parts) == 1 and len(parts[0].places) == choices.PREVIEW_POINTS, f"{[len(part.places) for part in parts]} points are shown")
         obj.hide_set(True)
         yield pause(PAUSE)
         check(seen("hidden") < NONE, f"{seen()} pixels of a hidden {obj.type}")
@@ -94,10 +96,10 @@ def test_thinned_points_are_hidden_by_what_is_nearer():
         bpy.context.scene.collection.objects.link(instance)
         yield pause(PAUSE)
         check(seen("instance") > 0.97 * whole, f"{obj.type}: {seen()} of {whole} pixels of an instance")
-        before, preferences.PREVIEW_POINTS = preferences.PREVIEW_POINTS, 0
+        before, choices.PREVIEW_POINTS = choices.PREVIEW_POINTS, 0
         area().tag_redraw()
         yield pause(PAUSE)
-        none, preferences.PREVIEW_POINTS = seen("none"), before
+        none, choices.PREVIEW_POINTS = seen("none"), before
         check(none < NONE, f"{obj.type}: {none} pixels without a budget")
 
 

@@ -8,9 +8,11 @@ import bpy
 import numpy as np
 from check_import import import_ply, write_ply
 from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, patina, render, reports, sphere, stats, written
-from patina import histogram, migrate, point_data
-from patina.importers import library
-from patina.sync import clouds, edits, linked, trust
+from patina import migrate, point_data
+from patina.draw import histogram
+from patina.read.importers import library
+from patina.sync.analyses import trust
+from patina.sync.points import built, edits, linked
 
 BALL, STRAYS = 20000, 20
 KINDS = ('MESH', 'POINTCLOUD') if point_data.HAS_CLOUDS else ('MESH',)
@@ -28,7 +30,7 @@ def places():
 
 
 def scene_with_strays(kind='MESH', width=160, height=120):
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     histogram.forget()
     scene = new_scene(width, height)
     scene.patina.surface = 'SPLATS'
@@ -237,7 +239,7 @@ def test_select_untrusted_of_a_linked_cloud():
 def test_export_of_trusted_points():
     """All formats, both kinds, and linked clouds without what was deleted."""
     kinds = [kind for kind, packages in (('PLY', ()), ('LAS', ()), ('LAZ', ("laspy", "lazrs")), ('E57', ("pye57",)))
-             if not any(patina.readers.lacks(name) for name in packages)]
+             if not any(patina.read.readers.lacks(name) for name in packages)]
     for kind in KINDS:
         _, obj = scene_with_strays(kind)
         render()
@@ -246,7 +248,7 @@ def test_export_of_trusted_points():
             path = SCRATCH / f"trusted-{kind}.{file.lower()}"
             for trusted in (False, True):
                 bpy.ops.export_scene.patina_points(filepath=str(path), kind=file, overwrite=True, trusted=trusted)
-                points = patina.importers.reader(path).read(path, patina.importers.Filter(), patina.importers.Progress())
+                points = patina.read.importers.reader(path).read(path, patina.read.importers.Filter(), patina.read.importers.Progress())
                 positions = points.positions + np.array(points.origin)
                 strays = int((positions[:, 2] > -2.9).sum())
                 check(len(positions) == BALL + STRAYS - out * trusted, f"{kind}, {file}: {len(positions)} points, {out} are untrusted")
@@ -267,7 +269,7 @@ def test_export_of_trusted_points():
 def test_none_is_trusted():
     """All are drawn, and one warning says so; with 0 none does. Statistics and the selection agree."""
     for kind in KINDS:
-        clouds.CACHE.clear()
+        built.CACHE.clear()
         new_scene(160, 120).patina.surface = 'FILL'
         positions = np.random.default_rng(2).uniform(-1.0, 1.0, (300, 3)) - (0, 0, 4)
         obj = add_points(positions, np.full((300, 4), 255, np.uint8))
@@ -348,12 +350,12 @@ def test_an_older_cache_is_analyzed_again():
     obj, _ = linked_strays("old.ply")
     wanted = render()
     place = linked.source_of(obj, 1, []).kept
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     make_older(place)
     again = render()
     check(sum("older version" in text for text in warnings()) == 1 and len(warnings()) == 1, f"{reports}")
     check(np.array_equal(again["Combined"], wanted["Combined"]), "the same picture")
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     third = render()
     check(not warnings() and np.array_equal(third["Combined"], wanted["Combined"]), f"kept: {reports}")
 
@@ -371,7 +373,7 @@ def test_an_older_saved_cloud_is_analyzed_again():
     check(not warnings() and wanted["Combined"][..., 3].any(), f"of today: {reports}")
     make_older(place)
     before = place.read_bytes()
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     again = render()
     check_close(again["Combined"], wanted["Combined"], 1e-6, "the same image but for roundings")
     check(sum("older version" in text and "patina analyse" in text for text in warnings()) == 1, f"{reports}")

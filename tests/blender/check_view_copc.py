@@ -10,8 +10,9 @@ from check_copc import import_copc, in_a_hurry, made, open_address
 from check_formats import with_laspy
 from harness import check
 from mathutils import Quaternion
-from patina import programs, viewport
-from patina.sync import clouds
+from patina.draw import viewport
+from patina.read import programs
+from patina.sync.points import built
 from window import area, setup, shown, view
 
 
@@ -35,7 +36,7 @@ def test_copc_grows_sharper():
     start = time.perf_counter()
     path, entries, _ = made("window.copc.laz", 120000)
     print(f"  written in {time.perf_counter() - start:.1f} s")
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     setup()
     view().view_distance = 60.0
     import_copc(path, 'ON')
@@ -57,7 +58,7 @@ def test_copc_from_a_slow_server():
     """The line says what is on its way; moving waits for nothing."""
     with_laspy()
     path, _, _ = made("slow-window.copc.laz", 60000)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     server = subprocess.Popen([programs.python(), str(Path(__file__).with_name("range_server.py")), str(path), "slower"],
                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     try:
@@ -98,7 +99,7 @@ def test_copc_of_a_server_that_goes_away():
     """One message that names the address and the page; the last good picture stays."""
     with_laspy()
     path, _, _ = made("gone-window.copc.laz", 60000)
-    clouds.CACHE.clear()
+    built.CACHE.clear()
     server = subprocess.Popen([programs.python(), str(Path(__file__).with_name("range_server.py")), str(path), "slower"],
                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     try:

@@ -10,7 +10,7 @@ from check_edits import ROWS, chosen, wall
 from check_import import import_ply
 from harness import Skip, check
 from patina import point_data
-from patina.sync import edits
+from patina.sync.points import edits
 from window import area, newer, override, screenshot, settled, setup, shown, window_region
 
 GREEN = (40, 200, 60)

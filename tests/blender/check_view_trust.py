@@ -5,8 +5,8 @@ import bpy
 import numpy as np
 from check_trust import BALL, KINDS, STRAYS, places
 from harness import add_points, check
-from patina import histogram
-from patina.sync import trust
+from patina.draw import histogram
+from patina.sync.analyses import trust
 from window import newer, screenshot, settled, setup, shown, whole_window
 
 

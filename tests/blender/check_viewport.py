@@ -7,8 +7,8 @@ from check_combine import hide_each_other
 from check_world import image_of, sky, world_with
 from harness import add_light, add_points, check, check_close, render, sphere
 from mathutils import Matrix, Quaternion
-from patina import backdrop, pace, viewport
-from patina.sync.analyzing import ANALYSES
+from patina.draw import backdrop, pace, viewport
+from patina.sync.analyses.analyzing import ANALYSES
 from window import area, clip_border, newer, screenshot, settled, setup, shown, toggle_local_view, view, window_region
 
 
@@ -286,7 +286,7 @@ def test_local_view_and_border():
     view().view_perspective = 'CAMERA'
     before = shown().pictures
     yield newer(before)
-    frame = viewport.sync.camera.camera_frame(region, view(), scene.camera, scene)
+    frame = viewport.sync.view.camera.camera_frame(region, view(), scene.camera, scene)
     check(abs((frame[2] - frame[0]) / (frame[3] - frame[1]) - 64 / 48) < 0.01, f"camera frame {frame}")
     wanted = (frame[2] - frame[0]) / 2
     check(abs(shown().shown.color.shape[1] - wanted) <= 1.5, f"{shown().shown.color.shape} for {wanted}")

@@ -16,9 +16,9 @@ from check_import import import_ply as import_points
 from check_linked import dense
 from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, patina, render, sphere
 from mathutils import Quaternion
-from patina import graphics, histogram, pace, painting, viewport
-from patina.importers import las
-from patina.sync.analyzing import ANALYSES
+from patina.draw import graphics, histogram, pace, painting, viewport
+from patina.read.importers import las
+from patina.sync.analyses.analyzing import ANALYSES
 from window import area, invoke_import, newer, screenshot, settled, setup, shown, view, window_region
 
 
@@ -187,7 +187,7 @@ def test_what_changes_is_read():
     yield lambda: shown() and shown().shown.stats["points"] == 40000
     found = shown()
     reads = found.trusted.reads
-    native_clouds = [entry[1] for entry in patina.clouds.CACHE._entries.values()]
+    native_clouds = [entry[1] for entry in patina.built.CACHE._entries.values()]
     before = found.pictures
     view().view_rotation = Quaternion((0, 1, 0), 0.3)
     yield newer(before)
@@ -201,8 +201,8 @@ def test_what_changes_is_read():
     obj.data.update()
     yield newer(before)
     check(found.trusted.reads == reads + 1, f"painting read {found.trusted.reads - reads} objects")
-    check([entry[1] for entry in patina.clouds.CACHE._entries.values()] and
-          all(any(entry[1] is cloud for cloud in native_clouds) for entry in patina.clouds.CACHE._entries.values()),
+    check([entry[1] for entry in patina.built.CACHE._entries.values()] and
+          all(any(entry[1] is cloud for cloud in native_clouds) for entry in patina.built.CACHE._entries.values()),
           "painting built a cloud")
     picture = screenshot("painted")
     red = (picture[..., 0] > 0.9) & (picture[..., 1] < 0.1)
@@ -578,7 +578,7 @@ def test_a_spoilt_link_is_left_out():
 
 def test_a_damaged_cache_is_mended():
     """What is kept of a link is shown at once; where it turns out to be damaged, the file itself is read beside."""
-    from patina.sync import kept, linked
+    from patina.sync.points import kept, linked
     path = dense("mended_in_view.ply", 60000, (0, 0, 0))
     source = linked.source(path)
     linked.load(source)
@@ -595,7 +595,7 @@ def test_a_damaged_cache_is_mended():
     check(found.shown.clouds[0].cloud.count == 60000 and not found.message, found.message)
     mended = found.shown.color.copy()
     pictures = found.pictures
-    viewport.sync.clouds.CACHE.clear()
+    viewport.sync.points.built.CACHE.clear()
     bpy.context.scene.update_tag()
     found.trusted.forget()
     bpy.context.view_layer.objects.active.update_tag()

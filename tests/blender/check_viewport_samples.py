@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 from harness import _rect, add_points, check, render, sphere
 from mathutils import Quaternion
-from patina import engine, passes, viewport
-from patina import render as drawing
+from patina.draw import engine, passes, viewport
+from patina.draw import render as drawing
 from window import area, screenshot, settled, setup, shown, view, window_region
 
 

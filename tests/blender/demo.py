@@ -58,7 +58,7 @@ def import_points(path):
 
 def finite_points(obj):
     from patina import point_data
-    from patina.sync import attributes
+    from patina.sync.points import attributes
     points = attributes.positions(obj.data, point_data.count_of(obj.data)).astype(np.float64)
     return points[np.isfinite(points).all(axis=1)] + np.array(obj.location)
 
@@ -114,7 +114,7 @@ def save(target):
 
 
 def render_styles(scene, folder):
-    from patina import styles
+    from patina.styles import styles
     for entry in styles.entries():
         if entry.own:
             continue

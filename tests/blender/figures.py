@@ -21,7 +21,7 @@ import gpu
 import numpy as np
 from harness import add_points
 from mathutils import Quaternion
-from patina import viewport
+from patina.draw import canvas, viewport
 from window import area, invoke_import, settled, setup, shown, view, window_region
 
 SECONDS = 6.0  # of each kind of motion
@@ -185,11 +185,11 @@ def orbit_figures():
 
     # what is done of it on the GPU, each waited for, while no picture is made
     pictures = Timed(viewport.Viewport, "_draw_picture", finish_drawing)
-    uploads = Timed(viewport, "_upload", finish_drawing)
+    uploads = Timed(canvas, "_upload", finish_drawing)
     ask, viewport.Viewport._ask = viewport.Viewport._ask, lambda self, level: None
     for condition in orbit(SECONDS):
         yield condition
-        found._drawn = None  # uploaded anew each time
+        found.canvas.drawn = None  # uploaded anew each time
     viewport.Viewport._ask = ask
     pictures.restore()
     uploads.restore()

@@ -16,8 +16,9 @@ from statistics import median
 
 import harness
 from figures import ball, finish_drawing, orbit
-from patina import overlays, painting, point_data, viewport
-from patina.sync import analyzing
+from patina import point_data
+from patina.draw import overlays, painting, viewport
+from patina.sync.analyses import analyzing
 from window import area, settled, setup, shown, window_region
 
 SECONDS = float(os.environ.get("PATINA_FIGURES_SECONDS", "6"))  # of each orbit
@@ -119,5 +120,5 @@ def _each(found, steps, figures, key):
         except StopIteration as end:
             figures[key] = end.value["ms"]
             return
-        found._drawn = None
+        found.canvas.drawn = None
         yield condition

@@ -59,8 +59,9 @@ def load_addon():
 
 
 patina = load_addon()
-from patina import engine, passes, point_data  # noqa: E402
-from patina.sync import attributes  # noqa: E402
+from patina import point_data  # noqa: E402
+from patina.draw import engine, passes  # noqa: E402
+from patina.sync.points import attributes  # noqa: E402
 
 reports: list[tuple[str, str]] = []  # (kind, message) of the last render
 stats: list[str] = []

@@ -10,7 +10,7 @@ from check_linked import dense
 from check_sequence import scans
 from harness import SCRATCH, check, render
 from mathutils import Matrix, Quaternion
-from patina import viewport
+from patina.draw import viewport
 from window import area, settled, setup, view, window_region
 
 POINTS = 100000

@@ -50,7 +50,7 @@ def stage():
 def aim(scene, obj, azimuth, elevation, keep, at=(0.5, 0.5, 0.5)):
     """A camera that looks at a place in parts of the points' box, from so far that `keep` of its diagonal fills the picture's height."""
     from patina import point_data
-    from patina.sync import attributes
+    from patina.sync.points import attributes
     places = attributes.positions(obj.data, point_data.count_of(obj.data))
     low, high = np.percentile(places.astype(np.float64), (1.0, 99.0), axis=0)
     data = bpy.data.cameras.new("camera")
@@ -92,8 +92,8 @@ def painted(scan, folder):
     group.use, group.opacity = True, 0.3
     aim(scene, obj, *BEFORE)
     save(folder / "paint-3.png")
-    from patina import histogram
-    from patina.thumbnails import save as write
+    from patina.draw import histogram
+    from patina.draw.thumbnails import save as write
     known = histogram.of(obj)
     pixels = histogram.picture(known.counts, group.threshold, group.transition)[::-1]
     write(np.round(pixels * 255).astype(np.uint8), folder / "paint-histogram.png")

@@ -26,14 +26,14 @@ def begin(folder):
     import bpy
     import numpy as np
     from harness import new_scene, sphere
-    from patina import importers
-    from patina.importers import PointFile
+    from patina.read.importers import PointFile
+    from patina.sync.points import made
     scene = new_scene(96, 64)
     positions, colors, normals = sphere(4000)
     for index, name in enumerate(NAMES):
         points = PointFile(name, positions.astype(np.float32), normals.astype(np.float32), colors,
                            {"intensity": np.linspace(0, 1, 4000, dtype=np.float32)}, (0.0, 0.0, 0.0), 0, {"crs": "EPSG:1"})
-        obj = bpy.data.objects.new(name, importers.to_data(points, False))
+        obj = bpy.data.objects.new(name, made.to_data(points, False))
         scene.collection.objects.link(obj)
         obj.location = (1.3 * (2 * index - 1), 0.0, -0.5)
         obj.patina.opacity, obj.patina.lighting = 0.75, 'UNLIT'

@@ -47,7 +47,7 @@ def work():
 
 def progress():
     """Progress of the analyses that run beside the viewport. It changes while they work."""
-    from patina.sync.analyzing import ANALYSES
+    from patina.sync.analyses.analyzing import ANALYSES
     return [job.progress.value() for job in ANALYSES._jobs.values()]
 
 
@@ -127,7 +127,7 @@ class Runner:
             elif self.progress != (now := progress()):
                 self.asked, self.progress = time.perf_counter(), now
             elif time.perf_counter() - self.asked > PATIENCE:
-                from patina import viewport
+                from patina.draw import viewport
                 said = [found.message for found in viewport._VIEWPORTS]
                 raise AssertionError(f"waited {PATIENCE:.0f} s in vain (line {self.steps.gi_frame.f_lineno}; {said})")
         except StopIteration:

@@ -9,7 +9,8 @@ import bpy
 sys.path.insert(0, os.path.dirname(__file__))
 
 from check_styles import shipped, stage  # noqa: E402
-from patina import styles, thumbnails  # noqa: E402
+from patina.draw import thumbnails  # noqa: E402
+from patina.styles import styles  # noqa: E402
 
 for key in shipped():
     _, obj = stage()

@@ -35,7 +35,7 @@ def pause(seconds=PAUSE):
 
 def still():
     """Waits until the viewport shows its whole image of a scene whose analysis is done, and PAUSE longer."""
-    from patina.sync.analyzing import ANALYSES
+    from patina.sync.analyses.analyzing import ANALYSES
     from window import shown
     begun, since = time.perf_counter(), []
 
@@ -116,7 +116,7 @@ def tour():
         yield still()
         whole_window(f"06_edit_mode_{action.lower()}")
     in_view(bpy.ops.object.mode_set, mode='OBJECT')
-    from patina import styles
+    from patina.styles import styles
     for entry in styles.entries():
         if not entry.own:
             in_view(bpy.ops.patina.apply_style, style=entry.key)

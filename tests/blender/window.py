@@ -9,8 +9,8 @@ import numpy as np
 import screen
 from harness import new_scene
 from mathutils import Quaternion
-from patina import viewport
-from patina.sync.analyzing import ANALYSES
+from patina.draw import viewport
+from patina.sync.analyses.analyzing import ANALYSES
 
 KEEP = os.environ.get("PATINA_SCREENSHOTS")  # a folder that keeps them
 

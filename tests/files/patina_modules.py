@@ -11,8 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def imported(*names: str) -> list:
     """The modules of these names within the add-on."""
-    for name, place in (("patina", "addon"), ("patina.importers", "addon/importers")):  # whose __init__ need Blender
-        if name not in sys.modules:
-            sys.modules[name] = types.ModuleType(name)
-            sys.modules[name].__path__ = [str(ROOT / place)]
+    if "patina" not in sys.modules:  # whose __init__ needs Blender
+        sys.modules["patina"] = types.ModuleType("patina")
+        sys.modules["patina"].__path__ = [str(ROOT / "addon")]
     return [importlib.import_module(f"patina.{name}") for name in names]

@@ -22,7 +22,7 @@ import numpy as np
 from patina_modules import imported
 from runner import run_tests
 
-exporters, whole = imported("exporters", "whole")
+exporters, whole = imported("write.exporters", "whole")
 sys.path.append(str(Path(whole.__file__).parent / "streaming"))  # whose programs import each other so
 import shelf  # noqa: E402
 
@@ -317,7 +317,7 @@ except (t.exporters.ExportError, OSError) as error:
 
 def test_exports_to_a_full_disk():
     """Of each format: a message, the old file stays, nothing is left over."""
-    from patina import readers
+    from patina.read import readers
     for ending, needs in exporters.NEEDS.items():
         if readers.lacks(*needs):
             print(f"skip {ending}: {needs} not installed")

@@ -19,7 +19,8 @@ from runner import Skip, run_tests
 
 SHARED = ROOT.parent / "shared/data"
 las, e57, pcd, library, reading, unpacking, readers, native, e57_xml = imported(
-    "importers.las", "importers.e57", "importers.pcd", "importers.library", "importers.reading", "unpacking", "readers", "native", "unpacking.e57_xml")
+    "read.importers.las", "read.importers.e57", "read.importers.pcd", "read.importers.library", "read.importers.reading", "read.unpacking",
+    "read.readers", "native", "read.unpacking.e57_xml")
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-hostile-"))
 READERS = {".las": las, ".laz": las, ".e57": e57, ".pcd": pcd}
 

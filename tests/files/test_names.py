@@ -22,7 +22,8 @@ import numpy as np
 from patina_modules import ROOT, imported
 from runner import Skip, run_tests
 
-exporters, library, reading, scans = imported("exporters", "importers.library", "importers.reading", "importers.scans")
+exporters, library, reading, scans = imported(
+    "write.exporters", "read.importers.library", "read.importers.reading", "read.importers.scans")
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-names-"))
 PATINA = str(Path(os.environ["PATINA_LIBRARY"]).parent / "patina")
 PLY = "ply\nformat ascii 1.0\nelement vertex 30\nproperty float x\nproperty float y\nproperty float z\nend_header\n" + \

@@ -57,7 +57,7 @@ def test_sources_evaluate_nothing():
             assert not any(word.arg == "shell" or word.arg == "allow_pickle" for word in node.keywords), place
             if name.startswith("subprocess."):
                 starts.add(str(path.relative_to(ROOT / "addon")))
-    assert starts == {"farm/slurm.py", "farm/task.py", "readers.py", "streaming/__init__.py", "unpacking/__init__.py"}, starts
+    assert starts == {"farm/slurm.py", "farm/task.py", "read/readers.py", "read/streaming/__init__.py", "read/unpacking/__init__.py"}, starts
 
 
 def imported(binary):
@@ -107,9 +107,9 @@ def test_decoders_have_a_process():
               "p = t.read(t.SCRATCH / 'a.laz'); print(len(p.positions), 'lazrs' in sys.modules); import shutil; shutil.rmtree(t.SCRATCH)\n")
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.stdout.split() == ["1000", "1000", "False"], done.stdout + done.stderr
-    limits = (ROOT / "addon/unpacking/limits.py").read_text("utf-8")
-    assert "RLIMIT_AS" in limits and "limit_memory(" in (ROOT / "addon/unpacking/main.py").read_text("utf-8")
-    assert "limit_memory(" in (ROOT / "addon/streaming/reader.py").read_text("utf-8")
+    limits = (ROOT / "addon/read/unpacking/limits.py").read_text("utf-8")
+    assert "RLIMIT_AS" in limits and "limit_memory(" in (ROOT / "addon/read/unpacking/main.py").read_text("utf-8")
+    assert "limit_memory(" in (ROOT / "addon/read/streaming/reader.py").read_text("utf-8")
 
 
 JOB = {"patina_job": 1, "rounds": 1, "arguments": ["a.ply"], "files": {}, "name": "tower", "kind": "tiles", "by": "patina", "program": "patina",

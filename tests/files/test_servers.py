@@ -27,13 +27,13 @@ import test_hostile
 from runner import Skip, run_tests
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "addon/streaming"), str(ROOT / "addon/unpacking"), str(ROOT / "tests/blender")]
+sys.path[:0] = [str(ROOT / "addon/read/streaming"), str(ROOT / "addon/read/unpacking"), str(ROOT / "tests/blender")]
 import copc  # noqa: E402
 import copc_files  # noqa: E402
 import ept_files  # noqa: E402
 import source  # noqa: E402
 
-streaming = importlib.import_module("patina.streaming")
+streaming = importlib.import_module("patina.read.streaming")
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-servers-"))
 DATA = bytes(range(200)) * 5
 IN_A_HURRY = {"timeout": 1.0, "wait": 0.01}
@@ -194,7 +194,7 @@ def test_encryption():
 def streamed(place, pages=(), seconds=20.0, workers=4, **options):
     """What the reading process says of a place, and the most memory it took, in MB. options: further ones of the process."""
     folder = Path(tempfile.mkdtemp(dir=SCRATCH))
-    process = subprocess.Popen([sys.executable, str(ROOT / "addon/streaming/reader.py"), str(folder)], stdin=subprocess.PIPE)
+    process = subprocess.Popen([sys.executable, str(ROOT / "addon/read/streaming/reader.py"), str(folder)], stdin=subprocess.PIPE)
     try:
         process.stdin.write(json.dumps({"place": str(place), "workers": workers, **IN_A_HURRY, **options}).encode() + b"\n")
         process.stdin.flush()

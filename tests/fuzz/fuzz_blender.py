@@ -19,9 +19,10 @@ import fuzzer  # noqa: E402
 import harness  # noqa: E402
 import mutate  # noqa: E402
 from fuzzer import Reader, Refused  # noqa: E402
-from patina import native, styles  # noqa: E402
-from patina.importers.reading import told  # noqa: E402
-from patina.sync import kept  # noqa: E402
+from patina import native  # noqa: E402
+from patina.read.importers.reading import told  # noqa: E402
+from patina.styles import styles  # noqa: E402
+from patina.sync.points import kept  # noqa: E402
 
 os.environ["BLENDER_USER_SCRIPTS"] = str(harness.SCRATCH)
 GROUPS = {"scene": lambda: bpy.context.scene, "points": lambda: bpy.data.objects["points"], "layer": lambda: bpy.context.view_layer,

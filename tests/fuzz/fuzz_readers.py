@@ -19,7 +19,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 ROOT = Path(__file__).resolve().parents[2]
-for folder in ("tests/files", "addon/streaming", "addon/unpacking", "tests/blender", "addon/farm", "tests/fuzz"):
+for folder in ("tests/files", "addon/read/streaming", "addon/read/unpacking", "tests/blender", "addon/farm", "tests/fuzz"):
     sys.path.insert(0, str(ROOT / folder))
 import copc  # noqa: E402
 import copc_files  # noqa: E402
@@ -31,7 +31,7 @@ import source  # noqa: E402
 import task  # noqa: E402
 import test_hostile as hostile  # noqa: E402
 from fuzzer import Reader, Refused  # noqa: E402
-from patina.importers import crs, scans  # noqa: E402
+from patina.read.importers import crs, scans  # noqa: E402
 
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-fuzz-"))
 PROGRAM = os.environ.get("PATINA_PROGRAM") or str(Path(os.environ["PATINA_LIBRARY"]).resolve().with_name("patina"))

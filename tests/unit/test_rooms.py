@@ -10,7 +10,7 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-READER = "addon/sync/attributes.py"  # of Blender's memory
+READER = "addon/sync/points/attributes.py"  # of Blender's memory
 
 
 class Rooms(unittest.TestCase):
@@ -49,9 +49,9 @@ class Rooms(unittest.TestCase):
                  "word = c_float.from_address(mesh.as_pointer())", "seen = numpy.array(Holder(__array_interface__=told))",
                  "words = (c_int * 4).from_buffer(layer)")
         for line in lines:
-            self.refuses("addon/sync/clouds.py", line, "addon/sync/clouds.py:", "memory by its address", READER)
-        number = len((self.folder / "addon/viewport.py").read_text(encoding="utf-8").splitlines()) + 2
-        self.refuses("addon/viewport.py", "import ctypes", f"addon/viewport.py:{number}:")
+            self.refuses("addon/sync/points/clouds.py", line, "addon/sync/points/clouds.py:", "memory by its address", READER)
+        number = len((self.folder / "addon/draw/viewport.py").read_text(encoding="utf-8").splitlines()) + 2
+        self.refuses("addon/draw/viewport.py", "import ctypes", f"addon/draw/viewport.py:{number}:")
         for name in (READER, "addon/native/__init__.py"):
             path = self.folder / name
             path.write_text(path.read_text(encoding="utf-8") + "\nimport ctypes\n", encoding="utf-8")
