@@ -62,6 +62,29 @@ class Rooms(unittest.TestCase):
         self.refuses("native/scene/cloud.c", "#include <pthread.h>", "operating system")
         self.refuses("native/plan/plan.h", '#include "passes.h"', "a circle")
 
+    def test_imports_of_the_addon_go_one_way(self) -> None:
+        self.refuses("addon/sync/points/ranges.py", "from ...operators import polls", "ranges.py:", "sync may not import operators")
+        self.refuses("addon/draw/pace.py", "def late():\n    from ..ui import rows", "draw may not import ui")
+        self.refuses("addon/description/view.py", "from ..sync.view import camera", "description may not import sync")
+        self.refuses("addon/native/loader.py", "from .. import options", "native may not import options")
+        self.refuses("addon/sync/view/camera.py", "def late():\n    from . import clipping", "a circle of imports", "sync.view.camera", "sync.view.clipping")
+        self.refuses("addon/read/streaming/source.py", "def late():\n    import ept", "a circle of imports", "read.streaming.source")
+
+    def test_readers_and_writers_do_not_know_blender(self) -> None:
+        for name in ("description/points.py", "native/frames.py", "read/importers/las.py", "write/exporters.py", "jobs.py"):
+            self.refuses(f"addon/{name}", "import bpy", f"addon/{name}:", "may not import bpy")
+        self.refuses("addon/read/readers.py", "def late():\n    from mathutils import Vector", "read may not import mathutils")
+
+    def test_sizes_of_the_addon(self) -> None:
+        self.refuses("addon/ui/rows.py", "# more\n" * 500, "addon/ui/rows.py:", "more than 500")
+        flat = [self.folder / f"addon/{name}.py" for name in ("one", "two", "three")]
+        for path in flat:
+            path.write_text("", encoding="utf-8")
+        code, text = self.check()
+        self.assertEqual(code, 1, text)
+        for said in ("ADDON in build/check_rooms does not list one", "lie flat, more than 12"):
+            self.assertIn(said, text)
+
 
 if __name__ == "__main__":
     unittest.main()
