@@ -164,7 +164,7 @@ class Written(unittest.TestCase):
         self.assertGreater(len(set(levels)), 8)
 
     def test_constants_are_of_today(self) -> None:
-        """What the library was built with was made from today's scenes, scanners and trainer."""
+        """What the library was built with was made from today's scenes, scanners, trainer and features: what train.py --check says."""
         text = train.CONSTANTS.read_text() if train.CONSTANTS.is_file() else ""
         if "tests/truth/trust/train.py" not in text:
             print(f"skip test_constants_are_of_today: {train.CONSTANTS} was not written by train.py")
@@ -173,6 +173,8 @@ class Written(unittest.TestCase):
         self.assertEqual(samples.checked(scenes), scenes)
         self.assertEqual(names, train.names_of_features("library"))
         self.assertEqual(sum_, train.made_from(names, scenes), "train again: tests/truth/trust/train.py")
+        if constants.library() is not None:
+            self.assertEqual(train.complaint(text), "", "train again: tests/truth/trust/train.py")
 
     def test_default_threshold(self) -> None:
         """Of each scene at most a hundredth of the right samples lies below, and of one more than that if it were one higher."""
