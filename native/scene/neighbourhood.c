@@ -91,18 +91,21 @@ static double nearest_of(const struct pt_sample *sample, uint32_t *distinct)
 // Median of the neighbours' distances to their nearest among each other; at most 24 of them. upper: their third quartile, or NULL.
 static double mutual_distance(const struct pt_sample *sample, double *upper)
 {
-    double nearest[24];
+    double nearest[24], least[24];
     const uint32_t count = sample->count < 24 ? sample->count : 24;
+    for (uint32_t i = 0; i < count; i++)
+        least[i] = INFINITY;
     for (uint32_t i = 0; i < count; i++) {
-        double least = INFINITY;
-        for (uint32_t j = 0; j < count; j++) {
+        double own = least[i];
+        for (uint32_t j = i + 1; j < count; j++) {
             const double square = distance_squared(sample->offset[i], sample->offset[j]);
-            least = j != i && square < least ? square : least;
+            own = square < own ? square : own;
+            least[j] = square < least[j] ? square : least[j];
         }
         uint32_t at = i;
-        for (; at > 0 && nearest[at - 1] > least; at--)
+        for (; at > 0 && nearest[at - 1] > own; at--)
             nearest[at] = nearest[at - 1];
-        nearest[at] = least;
+        nearest[at] = own;
     }
     if (upper)
         *upper = count ? sqrt(nearest[3 * count / 4]) : 0.0;

@@ -16,6 +16,7 @@ struct walk {
     _Alignas(64) double place[3][PT_LEAF]; // of the lanes, in the frame that is walked
     _Alignas(64) double worst
         [PT_LEAF]; // square of the distance to the k-th found; negative: a lane that does not look; DBL_MAX: fewer are found, and points at infinity are none
+    double bound[PT_LEAF];                   // worst until k are found: DBL_MAX, or what the caller knows
     double middle[3];                        // of them: what is nearest to it is walked first
     const struct pt_neighbours *tree, *from; // that is walked, that the lanes are of
     struct pt_found *found;
@@ -84,7 +85,7 @@ static void begin_lane(struct walk *walk, uint32_t lane)
     for (uint32_t i = 0; i < (walk->k + ROUND - 1) / ROUND * ROUND; i++)
         walk->found->square[lane][i] = INFINITY;
     walk->found->count[lane] = 0;
-    walk->worst[lane] = DBL_MAX;
+    walk->worst[lane] = walk->bound[lane];
 }
 
 // A full list's farthest: -1 ends the search of a point that has found enough at its own place.
@@ -115,7 +116,7 @@ static inline void take_each(struct walk *walk, uint32_t lane, const double squa
         places[at] = place;
     }
     walk->found->count[lane] = count;
-    walk->worst[lane] = count == walk->k ? worst_of(walk, squares[count - 1]) : DBL_MAX;
+    walk->worst[lane] = count == walk->k ? worst_of(walk, squares[count - 1]) : walk->bound[lane];
 }
 
 // ---- plain -----------------------------------------------------------------------------------------------------------------
@@ -271,7 +272,7 @@ TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk
                 _mm256_storeu_si256((__m256i *)(places + 8 * i), p[i]);
             }
             walk->found->count[lane] = count;
-            walk->worst[lane] = count == walk->k ? worst_of(walk, squares[last]) : DBL_MAX;
+            walk->worst[lane] = count == walk->k ? worst_of(walk, squares[last]) : walk->bound[lane];
             take_each(walk, lane, square, near, first);
             return;
         }
@@ -292,7 +293,7 @@ TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk
         _mm256_storeu_si256((__m256i *)(places + 8 * i), p[i]);
     }
     walk->found->count[lane] = count;
-    walk->worst[lane] = count > last ? worst_of(walk, squares[last]) : DBL_MAX;
+    walk->worst[lane] = count > last ? worst_of(walk, squares[last]) : walk->bound[lane];
 }
 
 TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near,
@@ -313,12 +314,14 @@ TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const do
 
 // ----------------------------------------------------------------------------------------------------------------------------
 
-void pt_neighbours_find(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf, uint32_t lanes,
-                        uint32_t k, struct pt_found *found)
+void pt_neighbours_find_within(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf, uint32_t lanes,
+                               uint32_t k, const double squares[PT_LEAF], struct pt_found *found)
 {
     struct walk walk = {.tree = tree, .from = from, .found = found, .leaf = leaf, .k = k, .frame = NO_FRAME};
-    for (int i = 0; i < PT_LEAF; i++)
+    for (int i = 0; i < PT_LEAF; i++) {
         walk.worst[i] = -1.0;
+        walk.bound[i] = squares ? fmin(squares[i], DBL_MAX) : DBL_MAX;
+    }
     for (uint32_t left = lanes; left; left &= left - 1)
         begin_lane(&walk, (uint32_t)__builtin_ctz(left));
     if (!lanes)
@@ -334,6 +337,12 @@ void pt_neighbours_find(const struct pt_neighbours *tree, const struct pt_neighb
     }
 #endif
     walk_cloud_plain(&walk);
+}
+
+void pt_neighbours_find(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf, uint32_t lanes,
+                        uint32_t k, struct pt_found *found)
+{
+    pt_neighbours_find_within(tree, from, leaf, lanes, k, NULL, found);
 }
 
 void pt_neighbours_offset(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t at, uint32_t to,

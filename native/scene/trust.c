@@ -279,11 +279,22 @@ static uint32_t level_of(const struct pt_trust *trust, const struct pt_chunk *ch
     return pt_trust_level(features);
 }
 
+// Squares of distances within which the points of a leaf have K neighbors, as the first walk noted. A float holds the length to 6e-8.
+static void bounds_of(const struct pt_trust *trust, uint32_t leaf, double squares[PT_LEAF])
+{
+    for (uint32_t lane = 0; lane < PT_LEAF; lane++) {
+        const uint8_t byte = trust->reach[leaf * PT_LEAF + lane];
+        const double length = (1.0 + 1e-6) * length_of(byte, trust->base);
+        squares[lane] = byte == 0 || byte == 255 ? INFINITY : length * length;
+    }
+}
+
 static void judge_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct pt_trust *trust = context;
     const struct pt_neighbours *tree = trust->tree;
     struct pt_found found;
+    double squares[PT_LEAF];
     (void)thread;
     for (uint32_t i = begin; i < end; i++) {
         const uint32_t c = tree->chunk_order[i];
@@ -292,7 +303,8 @@ static void judge_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
             if (pt_progress_cancelled(trust->progress))
                 return;
             const uint32_t lanes = pt_leaf_lanes(tree, leaf);
-            pt_neighbours_find(tree, tree, leaf, lanes, K, &found);
+            bounds_of(trust, leaf, squares);
+            pt_neighbours_find_within(tree, tree, leaf, lanes, K, squares, &found);
             for (uint32_t left = lanes; left; left &= left - 1) {
                 const uint32_t place = leaf * PT_LEAF + (uint32_t)__builtin_ctz(left), slot = tree->slots[place];
                 const uint32_t level = level_of(trust, chunk, place, &found);
