@@ -58,8 +58,8 @@ void pt_neighbours_find(const struct pt_neighbours *tree, const struct pt_neighb
                         uint32_t k, struct pt_found *found);
 // The same, faster, where the caller knows a bound for each lane: the square of a distance within which it has k neighbors. Infinite
 // where it knows none. A lane with fewer neighbors within its bound finds only those.
-void pt_neighbours_find_within(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf, uint32_t lanes,
-                               uint32_t k, const double squares[PT_LEAF], struct pt_found *found);
+void pt_neighbours_find_within(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf,
+                               uint32_t lanes, uint32_t k, const double squares[PT_LEAF], struct pt_found *found);
 // From the point at place `at` of `from` to that at `to` of `tree`.
 void pt_neighbours_offset(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t at, uint32_t to,
                           double offset[3]);

@@ -314,8 +314,8 @@ TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const do
 
 // ----------------------------------------------------------------------------------------------------------------------------
 
-void pt_neighbours_find_within(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf, uint32_t lanes,
-                               uint32_t k, const double squares[PT_LEAF], struct pt_found *found)
+void pt_neighbours_find_within(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf,
+                               uint32_t lanes, uint32_t k, const double squares[PT_LEAF], struct pt_found *found)
 {
     struct walk walk = {.tree = tree, .from = from, .found = found, .leaf = leaf, .k = k, .frame = NO_FRAME};
     for (int i = 0; i < PT_LEAF; i++) {

@@ -23,7 +23,7 @@ from patina_modules import imported
 from runner import run_tests
 
 exporters, whole = imported("write.exporters", "whole")
-sys.path.append(str(Path(whole.__file__).parent / "streaming"))  # whose programs import each other so
+sys.path.append(str(Path(whole.__file__).parent / "read/streaming"))  # whose programs import each other so
 import shelf  # noqa: E402
 
 LONG = bool(os.environ.get("PATINA_LONG"))
