@@ -14,6 +14,14 @@
 #define EDL_LOG 300.0
 #define EDL_PIXEL (EDL_LOG * 1.4427 * 0.82 / 1024.0)
 
+// Pixels: the k-th of the radii.
+static double edl_radius(const patina_effects *effects, int k)
+{
+    return fmin((double)effects->edl_radius * (1 << k), PT_EDL_MOST);
+}
+
+static uint32_t edl_reach(const patina_effects *effects) { return (uint32_t)lround(edl_radius(effects, PT_EDL_RADII - 1)); }
+
 static void plan_edl(struct pt_builder *builder, enum pt_plane color)
 {
     const struct view_args *view = &builder->plan->view;
@@ -23,17 +31,26 @@ static void plan_edl(struct pt_builder *builder, enum pt_plane color)
         return;
     }
     struct edl_args args = {.view = *view};
-    for (int i = 0; i < PT_EDL_NEIGHBOURS; i++) {
-        double angle = 2.0 * 3.14159265358979323846 * i / PT_EDL_NEIGHBOURS, radius = (double)effects->edl_radius;
-        args.offsets[2 * i] = (int32_t)lround(radius * pt_cos(angle));
-        args.offsets[2 * i + 1] = (int32_t)lround(radius * pt_sin(angle));
+    const double scale = view->perspective ? EDL_LOG : EDL_PIXEL / ((double)view->footprint * pt_finer(builder->scene));
+    for (int k = 0; k < PT_EDL_RADII; k++) {
+        const double radius = edl_radius(effects, k);
+        int32_t *offsets = args.offsets + 2 * PT_EDL_NEIGHBOURS * k;
+        for (int i = 0; i < PT_EDL_NEIGHBOURS; i++) {
+            double angle = 2.0 * 3.14159265358979323846 * i / PT_EDL_NEIGHBOURS;
+            offsets[2 * i] = (int32_t)lround(radius * pt_cos(angle));
+            offsets[2 * i + 1] = (int32_t)lround(radius * pt_sin(angle));
+        }
+        args.gain[k] = (float)(1.4427 * (double)effects->edl_strength / PT_EDL_NEIGHBOURS * edl_radius(effects, 0) / radius);
+        args.wide[k] = (float)(2.0 * radius); // two spacings: the radius is that of the discs
     }
-    args.reach = (uint32_t)lround((double)effects->edl_radius);
-    args.scale = (float)fmin(
-        fmax(view->perspective ? EDL_LOG : EDL_PIXEL / ((double)view->footprint * pt_finer(builder->scene)), 1e-30), 1e30);
-    args.gain = (float)(1.4427 * (double)effects->edl_strength / PT_EDL_NEIGHBOURS);
-    PT_REASON(PT_ADD(builder, edl, args, {pt_keys_of(builder, 0), pt_plane_at(color, 0)}),
-              "eye-dome lighting, strength %.2f, %u pixels around", (double)effects->edl_strength, args.reach);
+    args.reach = edl_reach(effects);
+    args.narrow = 1.0f / args.wide[PT_EDL_RADII - 1];
+    args.scale = (float)fmin(fmax(scale, 1e-30), 1e30);
+    PT_REASON(PT_ADD(builder, edl, args,
+                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(builder->plan),
+                      pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(color, 0)}),
+              "eye-dome lighting, strength %.2f, %ld to %u pixels around", (double)effects->edl_strength,
+              lround(edl_radius(effects, 0)), args.reach);
 }
 
 // ---- ambient obscurance ------------------------------------------------------------------------------------------------
@@ -445,7 +462,7 @@ uint32_t pt_effects_reach(const struct patina_scene *scene)
     const patina_effects *effects = &scene->effects;
     uint32_t reach = 0;
     if (effects->edl_strength > 0.0f)
-        reach += (uint32_t)lround((double)effects->edl_radius);
+        reach += edl_reach(effects);
     if (effects->obscurance_strength > 0.0f)
         reach += PT_REACH_obscure;
     if (follows_values(scene))

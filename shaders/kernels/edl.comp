@@ -16,27 +16,57 @@ float depth_of(float z, bool perspective)
     return perspective ? pt_log2(z) : z;
 }
 
+// Two spacings of the surface that the pixel shows, in pixels.
+float width_at(view_args view, uvec2 here, uint at, float z)
+{
+    uint source = read_from(at);
+    float cosine = pt_cosine(view, read_float4(source).xyz, pt_ray(view, int(here.x), int(here.y)));
+    precise float across = read_deff(source) * pt_min(pt_max(cosine, PT_EDL_GRAZING), 1.0);
+    precise float wide = across * pt_rcp(pt_footprint(view, z));
+    return wide;
+}
+
+// The least of the pixel and its first neighbours.
+float least_width(view_args view, uvec2 here, uint at, float z)
+{
+    float least = width_at(view, here, at, z);
+    for (int i = 0; i < PT_EDL_NEIGHBOURS && least > args.wide[0]; i++) {
+        uvec2 q = here + uvec2(uint(args.offsets[2 * i]), uint(args.offsets[2 * i + 1]));
+        uint near = q.y * view.width + q.x;
+        float z_q = q.x < view.width && q.y < view.height ? read_z(near) : pt_float(PT_KEY_EMPTY_Z);
+        if (z_q != pt_float(PT_KEY_EMPTY_Z))
+            least = pt_min(least, width_at(view, q, near, z_q));
+    }
+    return least;
+}
+
 void main()
 {
     view_args view = args.view;
     bool perspective = view.perspective != 0u;
-    float scale = args.scale, gain = args.gain;
+    float scale = args.scale;
     uvec2 here = pt_tile_line(view);
     for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
         uint at = here.y * view.width + here.x;
         float z = read_z(at);
         if (z == pt_float(PT_KEY_EMPTY_Z))
             continue;
-        float own = depth_of(z, perspective);
+        float own = depth_of(z, perspective), width = least_width(view, here, at, z);
+        int radius = 0;
+        while (radius < PT_EDL_RADII - 1 && width > args.wide[radius])
+            radius++;
+        float gain = args.gain[radius];
         precise float sum = 0.0;
         for (int i = 0; i < PT_EDL_NEIGHBOURS; i++) {
-            uint qx = here.x + uint(args.offsets[2 * i]), qy = here.y + uint(args.offsets[2 * i + 1]); // -1 wraps to beyond the plane
+            int offset = 2 * (PT_EDL_NEIGHBOURS * radius + i);
+            uint qx = here.x + uint(args.offsets[offset]), qy = here.y + uint(args.offsets[offset + 1]); // -1 wraps to beyond the plane
             bool inside = qx < view.width && qy < view.height;
             float near = inside ? depth_of(read_z(qy * view.width + qx), perspective) : PT_EDL_BEYOND;
             precise float behind = scale * (own - near);
             sum = sum + pt_min(pt_max(behind, 0.0), PT_EDL_STEP);
         }
-        precise float light = pt_exp2(0.0 - gain * sum);
+        precise float fade = pt_min(pt_max(2.0 - width * args.narrow, 0.0), 1.0);
+        precise float light = pt_exp2(0.0 - (fade * gain) * sum);
         vec4 c = color[at];
         precise vec3 darker = c.xyz * light;
         color[at] = vec4(darker, c.w);

@@ -15,7 +15,9 @@ struct tint_args {
 };
 
 #define PT_EDL_NEIGHBOURS 8
-#define PT_EDL_MOST 16    // largest radius, pixels
+#define PT_EDL_RADII 3    // the radius, twice and four times it
+#define PT_EDL_MOST 64    // largest radius, pixels
+#define PT_EDL_GRAZING 0.1f // least |n . v|
 // A neighbour's step counts up to this: beyond, an edge is an edge. So much darkens to 1/20 where half of the neighbours have
 // it, at strength 1.
 #define PT_EDL_STEP 6.0f
@@ -23,13 +25,19 @@ struct tint_args {
 #define PT_EDL_BEYOND 3e38f // beyond the plane: farther, so that it says nothing
 
 // edl: eye-dome lighting. A pixel is darker the farther it lies behind its neighbours: with f(z) = log2 z in perspective, z in
-// orthographic views, colour times 2^(-gain sum min(max(scale (f(z) - f(z_q)), 0), PT_EDL_STEP)). Empty neighbours count
+// orthographic views, colour times 2^(-fade gain sum min(max(scale (f(z) - f(z_q)), 0), PT_EDL_STEP)). Empty neighbours count
 // as nearer: a silhouette darkens within.
+// Where points are sparse, neighbours lie farther away, so that no disc or cell has an outline of its own. The width of what a
+// pixel shows is d_eff max(|n . v|, PT_EDL_GRAZING) / footprint(z), which is two spacings in pixels, and w the least of
+// it and the first radius' neighbours: discs' normals are means, by which rims of what is dense look sparse. The radius is the first with
+// w <= wide, or else the last; its gain is smaller as its radius is larger, so that a slope is equally dark with each of them.
+// Discs larger than the last radius fade: fade = clamp(2 - w / wide, 0, 1), wide: that of the last.
 struct edl_args {
     struct view_args view;
-    int32_t offsets[2 * PT_EDL_NEIGHBOURS]; // x, y in pixels
-    uint32_t reach;                         // the largest of them
-    float scale, gain;
+    int32_t offsets[2 * PT_EDL_NEIGHBOURS * PT_EDL_RADII]; // x, y in pixels, of each radius
+    uint32_t reach;                                        // the largest of them
+    float gain[PT_EDL_RADII], wide[PT_EDL_RADII];
+    float scale, narrow; // narrow: 1 / the last of wide
 };
 
 #define PT_OBSCURE_TAPS 6

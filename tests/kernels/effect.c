@@ -17,6 +17,8 @@ static void check(struct harness *h, const struct effect *effect, const void *ar
     uint32_t bindings = 0;
     for (const char *b = effect->buffers; *b; b++)
         bound[bindings++] = *b == 'k'   ? harness_buffer(h, picture->keys, count * 8)
+                            : *b == 'f' ? harness_buffer(h, picture->from, count * 4)
+                            : *b == 'd' ? harness_buffer(h, picture->deff, count * 4)
                             : *b == 'n' ? harness_buffer(h, picture->normal, count * 16)
                             : *b == 'a' ? harness_buffer(h, albedo, count * 16)
                             : *b == 's' ? (slopes ? harness_buffer(h, slopes, count * 16) : NULL)

@@ -10,7 +10,8 @@ typedef struct ref_color effect_reference(const void *args, const struct ref_pla
 struct effect {
     enum pt_kernel kernel;
     effect_reference *reference;
-    const char *buffers; // in the kernel's order: k keys, n normals shown, a albedo, s slopes, c the colours that change
+    const char *
+        buffers; // in the kernel's order: k keys, f sources, d d_eff, n normals shown, a albedo, s slopes, c the colours that change
 };
 
 // albedo may be NULL, and slopes, which others than effect_check_slopes have none of. Colours of empty pixels are NaN before and must stay so.

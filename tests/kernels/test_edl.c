@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// edl: radii, perspective and orthographic views, depths over seven decades, silhouettes.
+// edl: radii, perspective and orthographic views, depths over seven decades, silhouettes, points from dense to sparse.
 #include "effect.h"
 #include "shared/effects.h"
 
@@ -12,15 +12,45 @@ static struct ref_color reference(const void *args, const struct ref_planes *pla
     return ref_edl(args, planes, x, y);
 }
 
-static const struct effect edl = {PT_KERNEL_edl, reference, "kc"};
+static const struct effect edl = {PT_KERNEL_edl, reference, "kfdnc"};
 
 static struct edl_args args_of(const struct view_args *view, int radius, float scale, float gain)
 {
     static const int8_t ring[16] = {1, 0, 1, 1, 0, 1, -1, 1, -1, 0, -1, -1, 0, -1, 1, -1};
-    struct edl_args args = {.view = *view, .scale = scale, .gain = gain, .reach = (uint32_t)radius};
-    for (int i = 0; i < 16; i++)
-        args.offsets[i] = ring[i] * radius;
+    struct edl_args args = {.view = *view, .scale = scale};
+    for (int k = 0; k < PT_EDL_RADII; k++) {
+        const int wider = radius << k < PT_EDL_MOST ? radius << k : PT_EDL_MOST;
+        for (int i = 0; i < 16; i++)
+            args.offsets[16 * k + i] = ring[i] * wider;
+        args.gain[k] = gain * (float)radius / (float)wider;
+        args.wide[k] = 1.87f * (float)wider; // no picture has surfaces just so wide
+        args.reach = (uint32_t)wider;
+        args.narrow = 1.0f / args.wide[k];
+    }
     return args;
+}
+
+// Makes d_eff of each row so many footprints of its surface as the row says, from 2^-3 to 2^9, but of none smaller.
+static void spread(struct picture *picture)
+{
+    for (size_t i = 0; i < picture->count; i++) {
+        const int y = (int)(i / picture->view.width);
+        if (picture->keys[i] != REF_EMPTY_KEY)
+            picture->deff[i] = (float)(ref_footprint(&picture->view, ref_key_z(picture->keys[i])) * exp2(y % 25 / 2.0 - 3.1));
+    }
+}
+
+static void widths(struct harness *h)
+{
+    static const int radii[] = {1, 2, 16, PT_EDL_MOST};
+    for (int p = 0; p < 2; p++)
+        for (int kind = 0; kind < PICTURE_KINDS; kind++)
+            for (int r = 0; r < 4; r++) {
+                struct picture picture = effect_picture(h, (uint64_t)(kind + 40), 67, 75, p, (enum picture_kind)kind, r == 1);
+                struct edl_args args = args_of(&picture.view, radii[r], p ? 300.0f : 5.0f, 0.1f);
+                spread(&picture);
+                effect_check(h, &edl, &args, sizeof args, &picture, NULL);
+            }
 }
 
 static void kinds(struct harness *h)
@@ -85,15 +115,34 @@ static void sanity(struct harness *h)
     picture.keys[12] = ref_key(4.995f, 1);
     HARNESS_CHECK(h, ref_edl(&args, &planes, 2, 2).color[0] == whole);
     picture.keys[13] = REF_EMPTY_KEY; // one of eight is a silhouette
-    HARNESS_CHECK(h,
-                  fabs(ref_edl(&args, &planes, 2, 2).color[0] / whole - exp2(-(double)args.gain * (double)PT_EDL_STEP)) < 1e-9);
+    const double edge = exp2(-(double)args.gain[0] * (double)PT_EDL_STEP);
+    HARNESS_CHECK(h, fabs(ref_edl(&args, &planes, 2, 2).color[0] / whole - edge) < 1e-9);
+    // the wider what it shows, the farther away its neighbours are, till they are beyond the plane; then it fades
+    const float footprint = (float)ref_footprint(&picture.view, ref_key_z(picture.keys[12]));
+    for (size_t i = 0; i < picture.count; i++) {
+        const float toward[4] = {0.0f, 0.0f, 1.0f, 1.0f};
+        memcpy(picture.normal + 4 * i, toward, sizeof toward);
+        picture.from[i] = (uint32_t)i;
+        picture.deff[i] = 3.7f * footprint;
+    }
+    HARNESS_CHECK(h, ref_edl(&args, &planes, 2, 2).color[0] == whole);
+    picture.keys[14] = REF_EMPTY_KEY; // twice as far, half as dark
+    HARNESS_CHECK(h, fabs(ref_edl(&args, &planes, 2, 2).color[0] / whole - sqrt(edge)) < 1e-9);
+    for (size_t i = 0; i < picture.count; i++)
+        picture.deff[i] = 7.4f * footprint;
+    HARNESS_CHECK(h, ref_edl(&args, &planes, 2, 2).color[0] == whole);
+    for (size_t i = 0; i < picture.count; i++)
+        picture.deff[i] = 17.0f * footprint;
+    HARNESS_CHECK(h, ref_edl(&args, &planes, 2, 2).color[0] == whole);
+    picture.deff[11] = 1.0f * footprint; // beside what is dense it is as there
+    HARNESS_CHECK(h, fabs(ref_edl(&args, &planes, 2, 2).color[0] / whole - edge) < 1e-9);
 }
 
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"shapes of planes", shapes, 0},
-        {"scales", scales, 0}, {"rectangle", rectangle, 0},
+        {"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0},    {"shapes of planes", shapes, 0},
+        {"scales", scales, 0}, {"dense and sparse points", widths, 0}, {"rectangle", rectangle, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

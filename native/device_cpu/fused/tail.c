@@ -12,8 +12,8 @@ static uint32_t edl_rows(const struct tail *tail) { return tail->edl ? 2 * tail-
 static size_t thread_floats(const struct tail *tail)
 {
     const uint32_t rows = tail->ring_mask + 1;
-    return (tail->ring * CHANNELS_SEEN + rows * CHANNELS_COLOR + 4 + (tail->obscure ? rows : 0) + edl_rows(tail)) *
-           tail->stride;
+    return (tail->ring * CHANNELS_SEEN + rows * CHANNELS_COLOR + 4 + (tail->obscure ? rows : 0)) * tail->stride +
+           edl_rows(tail) * pt_edl_stride(tail->planes.view->width);
 }
 
 static void lay_out(const struct tail *tail, uint32_t thread, struct walk *walk)
@@ -36,7 +36,7 @@ static void lay_out(const struct tail *tail, uint32_t thread, struct walk *walk)
     at += 4 * s;
     for (uint32_t i = 0; i <= tail->ring_mask && tail->obscure; i++, at += s)
         walk->obscured[i] = at;
-    walk->edl = (struct pt_edl_ring){at - PT_ROW_PAD, s, edl_rows(tail)};
+    walk->edl = (struct pt_edl_ring){at - PT_ROW_PAD, pt_edl_stride(tail->planes.view->width), edl_rows(tail)};
 }
 
 // ---- smoothing -------------------------------------------------------------------------------------------------------------
@@ -386,6 +386,7 @@ int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
             break;
         case PT_KERNEL_edl:
             tail.edl = call->arguments;
+            tail.edl_planes = PT_EDL_PLANES(call);
             add_step(&tail, i, PT_BUF_edl_color);
             break;
         case PT_KERNEL_smooth:

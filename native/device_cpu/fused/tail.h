@@ -24,11 +24,12 @@ struct steps { // passes that follow one another
 
 struct tail {
     const struct pt_cpu_pass *passes;
-    uint32_t shade_count;                   // of passes, from the first on
-    struct steps before, darkened;          // pointwise: before smoothing; of these, behind `obscure`
-    struct steps after, last;               // behind smoothing; on the picture
-    const struct obscure_args *obscure;     // NULL: off
-    const struct edl_args *edl;             // NULL: off; a step among the others
+    uint32_t shade_count;               // of passes, from the first on
+    struct steps before, darkened;      // pointwise: before smoothing; of these, behind `obscure`
+    struct steps after, last;           // behind smoothing; on the picture
+    const struct obscure_args *obscure; // NULL: off
+    const struct edl_args *edl;         // NULL: off; a step among the others
+    struct pt_edl_planes edl_planes;
     const struct pt_buffer *albedo;         // the plane that one of them asks for; else NULL
     int shows_normals;                      // one of them, or extract, asks for normals
     const float *colors;                    // where nothing is shaded: as they are so far; and, where peeling or extract

@@ -265,7 +265,7 @@ static void darken(const struct tail *tail, struct walk *walk, const struct pt_c
     const struct pt_seen_row *seen = seen_row(tail, walk, y);
     const struct pt_edl_ring *ring = &walk->edl;
     const int32_t reach = (int32_t)args->reach, end = y + reach + 1;
-    const float *near[PT_EDL_NEIGHBOURS], *own = pt_edl_row(ring, y);
+    const float *near[PT_EDL_RADII * PT_EDL_NEIGHBOURS], *own = pt_edl_row(ring, y);
     if (walk->edl_next < y - reach || walk->edl_next > end)
         walk->edl_next = y - reach;
     for (; walk->edl_next < end; walk->edl_next++)
@@ -273,9 +273,10 @@ static void darken(const struct tail *tail, struct walk *walk, const struct pt_c
     pt_edl_near(args, ring, y, near);
     for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
         vf depth = vf_load(own + x);
-        if (!vm_bits(vf_lt(vf_set(PT_EDL_EMPTY), depth)))
+        vm some = vm_and(vm_first(pt_lanes_left(x, args->view.rect[2])), vf_lt(vf_set(PT_EDL_EMPTY), depth));
+        if (!vm_bits(some))
             continue;
-        vf light = pt_edl_light(args, near, depth, x);
+        vf light = pt_edl_light(args, &tail->edl_planes, near, depth, x, (uint32_t)y, some);
         for (int k = 0; k < 3; k++) // what is empty may become anything
             vf_store(colors->color[k] + x, vf_load(colors->color[k] + x) * light);
     }

@@ -15,15 +15,16 @@ static void edl_row(const struct edl *edl, const struct pt_edl_ring *ring, uint3
 {
     const struct edl_args *args = edl->args;
     const uint32_t *rect = args->view.rect;
-    const float *near[PT_EDL_NEIGHBOURS], *own = pt_edl_row(ring, (int32_t)y);
+    const float *near[PT_EDL_RADII * PT_EDL_NEIGHBOURS], *own = pt_edl_row(ring, (int32_t)y);
     float *colors = (float *)PT_DATA(edl->call, edl, color) + 4 * (size_t)y * args->view.width;
+    const struct pt_edl_planes planes = PT_EDL_PLANES(edl->call);
     pt_edl_near(args, ring, (int32_t)y, near);
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         vf depth = vf_load(own + x), color[4];
         vm some = vm_and(vm_first(pt_lanes_left(x, rect[2])), vf_lt(vf_set(PT_EDL_EMPTY), depth));
         if (!vm_bits(some))
             continue;
-        vf light = pt_edl_light(args, near, depth, x);
+        vf light = pt_edl_light(args, &planes, near, depth, x, y, some);
         vf_load4(colors + 4 * (size_t)x, color);
         for (int k = 0; k < 3; k++)
             color[k] = color[k] * light;
@@ -57,7 +58,7 @@ int PT_KERNEL_ENTRY(edl)(const struct pt_cpu_call *call)
     const struct edl_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
     struct edl edl = {
-        .call = call, .args = args, .ring = {.stride = pt_row_stride(args->view.width), .count = 2 * args->reach + 1}};
+        .call = call, .args = args, .ring = {.stride = pt_edl_stride(args->view.width), .count = 2 * args->reach + 1}};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     edl.ring.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * edl.ring.count * edl.ring.stride * sizeof(float));
