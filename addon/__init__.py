@@ -15,14 +15,14 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import migrate, operators, preferences, properties, ui, versions
-from .draw import engine, histogram, overlays, render, thinned, viewport
+from .draw import engine, histogram, missing, overlays, render, thinned, viewport
 from .properties import answers
 from .sync.analyses import estimates
 from .sync.objects import images, meshes
 from .sync.points import built, files
 from .sync.view import pairs
 
-_MODULES = (preferences, properties, files, migrate, pairs, overlays, thinned, engine, operators, ui)
+_MODULES = (preferences, properties, files, migrate, pairs, overlays, missing, thinned, engine, operators, ui)
 _UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 
 

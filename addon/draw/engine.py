@@ -134,7 +134,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
             description, picture = self._draw_moment(depsgraph, eye, moment, frame, show)
         for notice in filter(None, (*description.notices, picture.notice)):
             if notice not in told:
-                self._tell('WARNING', notice)
+                self._tell(losses.kind(notice), notice)
                 told.add(notice)
         return description, picture
 

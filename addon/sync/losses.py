@@ -15,6 +15,23 @@ class Loss(str):
     """A notice of what a picture was to show and does not."""
 
 
+class MissingFile(Loss):
+    """A linked file that does not exist. object_name: of the object that links it."""
+
+    object_name: str
+
+    def __new__(cls, text: str, object_name: str) -> MissingFile:
+        notice = super().__new__(cls, text)
+        notice.object_name = object_name
+        return notice
+
+
+def kind(notice: str) -> str:
+    """How the report of a render shows a notice. In background a loss stays a warning: an error would end the script that renders,
+    and only --patina-strict asks for that."""
+    return 'ERROR' if isinstance(notice, Loss) and not bpy.app.background else 'WARNING'
+
+
 def is_placed(instance: bpy.types.DepsgraphObjectInstance, notices: list[str]) -> bool:
     """Whether an object or instance stands somewhere; one that a driver, say, put at a place that is no number is named."""
     if math.isfinite(sum(map(sum, instance.matrix_world))):

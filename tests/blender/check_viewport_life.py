@@ -576,6 +576,38 @@ def test_a_spoilt_link_is_left_out():
     check(not found.notices, f"{found.notices}")
 
 
+def red_pixels(picture):
+    return int(((picture[..., 0] > 0.8) & (picture[..., 1] < 0.3) & (picture[..., 2] < 0.3)).sum())
+
+
+def test_a_missing_link_shows_a_red_box():
+    """A red box with the object's name, a line in the status bar, an error in F12. All go when the file is found again."""
+    from patina.draw import missing
+    path = dense("missing_in_view.ply", 20000, (0, 0, 0))
+    elsewhere = path.parent / "elsewhere_in_view"
+    setup()
+    import_points(path, link=True)
+    add_points(*sphere(5000, 0.3, (0, 0, 0)))
+    yield lambda: settled(25000)
+    obj, = (obj for obj in bpy.data.objects if obj.patina.linked_file)
+    check(not missing.status() and red_pixels(screenshot("link_there")) == 0, "red without a reason")
+    elsewhere.mkdir(exist_ok=True)
+    path.rename(elsewhere / path.name)
+    bpy.context.scene.update_tag()
+    yield lambda: settled(5000)
+    check(f"'{obj.name}'" in missing.status() and "missing" in missing.status(), missing.status())
+    check(red_pixels(screenshot("link_missing")) > 500, "no red box")
+    try:
+        bpy.ops.render.render()
+        check(False, "no error in the report")
+    except RuntimeError as error:
+        check(f"{path.name} is missing" in str(error), str(error))
+    bpy.ops.file.find_missing_files(directory=str(elsewhere))
+    bpy.context.scene.update_tag()
+    yield lambda: settled(25000)
+    check(not missing.status() and red_pixels(screenshot("link_found")) == 0, f"red although found: {missing.status()}")
+
+
 def test_a_damaged_cache_is_mended():
     """What is kept of a link is shown at once; where it turns out to be damaged, the file itself is read beside."""
     from patina.sync.points import kept, linked

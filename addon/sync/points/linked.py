@@ -24,7 +24,7 @@ from ...read.importers import scans as scans_of_files
 from ...read.streaming import shelf
 from ..analyses import analysis, analyzing
 from ..analyses.scans_of import SCAN_ENDING, Scans, scans_in
-from ..losses import Loss
+from ..losses import Loss, MissingFile
 from . import addresses, attributes, building, cache, files, kept, sequence
 from .colors import scalar_name
 from .origin import PROPERTY, TOGETHER, ZERO
@@ -100,7 +100,7 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str], analyzed: b
         bare = source(path, origin, scalar, False, shown, pattern)
         found = bare if bare and (analyzed is False or bare.kept.exists()) else found
     if found is None:
-        notices.append(Loss(f"'{obj.name}': the file {importers.told(path)} is missing"))
+        notices.append(MissingFile(f"'{obj.name}': the file {importers.told(path)} is missing", obj.name))
     return found
 
 

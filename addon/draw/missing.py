@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects whose linked file is missing: a red box with the object's name in the viewport, and a line in the status bar."""
+
+from __future__ import annotations
+
+import blf
+import bpy
+import gpu
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from gpu_extras.batch import batch_for_shader
+from mathutils import Vector
+
+from . import viewport
+
+RED = (1.0, 0.05, 0.05, 1.0)
+MOST = 100  # objects whose box is drawn
+TEXT = 12  # points: the size of the names
+_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))  # of Object.bound_box
+
+_handlers: list[object] = []
+
+
+def _objects(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The objects without their file that the 3D view shows."""
+    found = viewport.of_area(context.area)
+    if not found or context.space_data.shading.type != 'RENDERED':
+        return []
+    visible = {obj.name: obj for obj in context.visible_objects}
+    return [visible[name] for name in found.missing_files() if name in visible][:MOST]
+
+
+def _corners(obj: bpy.types.Object) -> list[Vector]:
+    return [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
+
+
+def _draw_boxes() -> None:
+    lines = []
+    for obj in _objects(bpy.context):
+        corners = _corners(obj)
+        lines += [tuple(corners[i]) for edge in _EDGES for i in edge]
+    if lines:
+        shader = gpu.shader.from_builtin('UNIFORM_COLOR')
+        gpu.state.depth_test_set('NONE')
+        shader.bind()
+        shader.uniform_float("color", RED)
+        batch_for_shader(shader, 'LINES', {"pos": lines}).draw(shader)
+
+
+def _draw_names() -> None:
+    context = bpy.context
+    for obj in _objects(context):
+        places = [place for corner in _corners(obj) if (place := location_3d_to_region_2d(context.region, context.region_data, corner))]
+        if places:
+            blf.size(0, TEXT * context.preferences.system.ui_scale)
+            blf.color(0, *RED)
+            blf.position(0, min(place.x for place in places), max(place.y for place in places) + 4.0, 0.0)
+            blf.draw(0, f"{obj.name}: file missing")
+
+
+def status() -> str:
+    """The line of the status bar; "" if no file is missing."""
+    names = list(dict.fromkeys(name for found in viewport.with_missing_files() for name in found.missing_files()))
+    if not names:
+        return ""
+    others = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    return f"Patina: the linked file of '{names[0]}'{others} is missing. Use File > External Data > Find Missing Files"
+
+
+def _draw_status(header: bpy.types.Header, _context: bpy.types.Context) -> None:
+    text = status()
+    if text:
+        header.layout.label(text=text, icon='ERROR')
+
+
+def register() -> None:
+    if bpy.app.background:
+        return
+    add = bpy.types.SpaceView3D.draw_handler_add
+    _handlers[:] = [add(_draw_boxes, (), 'WINDOW', 'POST_VIEW'), add(_draw_names, (), 'WINDOW', 'POST_PIXEL')]
+    bpy.types.STATUSBAR_HT_header.append(_draw_status)
+
+
+def unregister() -> None:
+    if _handlers:
+        for handler in _handlers:
+            bpy.types.SpaceView3D.draw_handler_remove(handler, 'WINDOW')
+        bpy.types.STATUSBAR_HT_header.remove(_draw_status)
+    _handlers.clear()
