@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Orthographic plans to a stated scale: a camera that looks down, a picture of the right size, a world file beside it."""
+"""Orthographic plans to a stated scale: a camera that looks down, an image of the right size, a world file next to it. The dialog
+asks for the sheet first. A render restores the scene."""
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
 from mathutils import Matrix, Vector
@@ -19,6 +22,57 @@ from ..sync.points import origin
 INCH = 0.0254  # metres
 MOST = 65536  # pixels a side, of the library and of Blender
 WORLD_FILES = {".png": ".pgw", ".tif": ".tfw", ".tiff": ".tfw", ".jpg": ".jgw", ".jpeg": ".jgw"}
+SHEETS = {"A4": (0.210, 0.297), "A3": (0.297, 0.420), "A2": (0.420, 0.594), "A1": (0.594, 0.841), "A0": (0.841, 1.189),
+          "LETTER": (0.2159, 0.2794), "TABLOID": (0.2794, 0.4318)}  # meters, upright
+_STEPS = (1.0, 2.0, 2.5, 5.0)  # of scales, times powers of ten
+_RESTORED = ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y", "use_border")
+
+
+def _dpi() -> FloatProperty:
+    return FloatProperty(name="Dots per Inch", default=150.0, min=1.0, soft_max=1200.0, precision=0,
+                         description="Resolution of the printer. Together with the scale it sets the size of a pixel")
+
+
+def _margin() -> FloatProperty:
+    return FloatProperty(name="Margin", default=0.02, min=0.0, max=1.0, subtype='FACTOR',
+                         description="Margin around the points, as a share of the longer side")
+
+
+class PATINA_OT_plan_sheet(Operator):
+    """Choose the sheet for a plan of the selected points, then the file. The scale is the largest round one that fits the sheet"""
+
+    bl_idname = "render.patina_plan_sheet"
+    bl_label = "Render Plan to Scale"
+    bl_options = {'INTERNAL'}
+
+    sheet: EnumProperty(name="Sheet", default="A3", description="Sheet of paper that the plan must fit",
+                        items=[(name, name.title(), f"{1000 * sides[0]:.0f} x {1000 * sides[1]:.0f} mm") for name, sides in SHEETS.items()])
+    dpi: _dpi()
+    margin: _margin()
+
+    def invoke(self, context: Context, _event: bpy.types.Event) -> set[str]:
+        if _box(context) is None:
+            self.report({'ERROR'}, "Patina: select objects with points first")
+            return {'CANCELLED'}
+        return context.window_manager.invoke_props_dialog(self, width=360)
+
+    def draw(self, context: Context) -> None:
+        self.layout.use_property_split = True
+        for name in ("sheet", "dpi", "margin"):
+            self.layout.prop(self, name)
+        box = _box(context)
+        if box:
+            scale = scale_for(box, SHEETS[self.sheet], self.margin, context.scene.unit_settings.scale_length)
+            self.layout.label(text=f"Scale 1 : {scale:g}")
+            self.layout.label(text=_size_text(context.scene, box, scale, self.dpi, self.margin))
+
+    def execute(self, context: Context) -> set[str]:
+        box = _box(context)
+        if box is None:
+            self.report({'ERROR'}, "Patina: select objects with points first")
+            return {'CANCELLED'}
+        scale = scale_for(box, SHEETS[self.sheet], self.margin, context.scene.unit_settings.scale_length)
+        return bpy.ops.render.patina_plan('INVOKE_DEFAULT', scale=scale, dpi=self.dpi, margin=self.margin)
 
 
 class PATINA_OT_render_plan(Operator, ExportHelper):
@@ -26,19 +80,24 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
 
     bl_idname = "render.patina_plan"
     bl_label = "Render Plan"
-    bl_options = {'REGISTER'}
+    bl_options = {'UNDO'}
 
     filename_ext = ".png"
     filter_glob: StringProperty(default="*.png;*.tif;*.tiff", options={'HIDDEN'})
     check_extension = None  # PNG or TIFF, as the name says
     scale: FloatProperty(name="Scale 1 :", default=100.0, min=1e-3, soft_max=10000.0, precision=1,
                          description="Meters in the scene per meter on paper")
-    dpi: FloatProperty(name="Dots per Inch", default=300.0, min=1.0, soft_max=1200.0, precision=0,
-                       description="Resolution of the printer. Together with the scale it sets the size of a pixel")
-    margin: FloatProperty(name="Margin", default=0.02, min=0.0, max=1.0, subtype='FACTOR',
-                          description="Margin around the points, as a share of the longer side")
+    dpi: _dpi()
+    margin: _margin()
     write_picture: BoolProperty(name="Render", default=True,
-                                description="Render immediately. Disabled: only set the camera and the resolution")
+                                description="Render now, and restore the camera and the resolution afterwards. Disabled: only set them")
+
+    def draw(self, context: Context) -> None:
+        for name in ("scale", "dpi", "margin", "write_picture"):
+            self.layout.prop(self, name)
+        box = _box(context)
+        if box:
+            self.layout.label(text=_size_text(context.scene, box, self.scale, self.dpi, self.margin))
 
     def execute(self, context: Context) -> set[str]:
         scene = context.scene
@@ -49,39 +108,86 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
         if box is None:
             self.report({'ERROR'}, "Patina: select objects with points first")
             return {'CANCELLED'}
-        pixel = self.scale * INCH / self.dpi / scene.unit_settings.scale_length
+        pixel = _pixel(context.scene, self.scale, self.dpi)
         width, height = _size(box, pixel, self.margin)
         if max(width, height) > MOST:
             self.report({'ERROR'}, f"Patina: a plan of {width:,} x {height:,} pixels; the most is {MOST:,} a side: "
                                    "a smaller scale or fewer dots per inch make it fit")
             return {'CANCELLED'}
-        camera = _camera(context, box, pixel, width, height)
-        render = scene.render
-        render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
-        render.pixel_aspect_x = render.pixel_aspect_y = 1.0
-        render.use_border = False
-        scene.camera = camera
         if self.write_picture:
-            kind = 'TIFF' if path.suffix.lower().startswith(".tif") else 'PNG'
-            kept = render.filepath, render.use_file_extension, render.image_settings.file_format
-            render.filepath, render.use_file_extension = str(path), False
-            try:
-                render.image_settings.file_format = kind
-                if bpy.ops.render.render(write_still=True) != {'FINISHED'}:
-                    return {'CANCELLED'}
-            finally:
-                render.filepath, render.use_file_extension, render.image_settings.file_format = kept
+            with _restored(scene):
+                camera = _set_up(context, None, box, pixel, width, height)
+                place = camera.location.copy()
+                try:
+                    if not _write(scene, path):
+                        return {'CANCELLED'}
+                finally:
+                    bpy.data.cameras.remove(camera.data)  # and its object
+            done = "The scene's camera and resolution are unchanged"
+        else:
+            known = bpy.data.objects.get("Plan")
+            usable = known and known.type == 'CAMERA' and known.name in scene.objects
+            camera = _set_up(context, known if usable else None, box, pixel, width, height)
+            place = camera.location
+            done = f"The scene now uses the camera '{camera.name}' and this resolution"
         zero, unit = _survey(context)
-        corner = zero + (camera.location.x - 0.5 * width * pixel, camera.location.y + 0.5 * height * pixel, 0.0)
+        corner = zero + (place.x - 0.5 * width * pixel, place.y + 0.5 * height * pixel, 0.0)
         target = path.with_suffix(WORLD_FILES[path.suffix.lower()])
         try:
             target.write_text(world_file(corner[0] / unit, corner[1] / unit, pixel / unit), encoding="ascii")
         except OSError as error:
             self.report({'ERROR'}, f"Patina: {target.name} cannot be written: {error.strerror}")
             return {'CANCELLED'}
-        self.report({'INFO'}, f"{width:,} x {height:,} pixels of {pixel:.6g} units; world file {target.name}. "
-                            f"The scene now uses the camera '{camera.name}' and this resolution")
+        self.report({'INFO'}, f"{width:,} x {height:,} pixels of {pixel:.6g} units; world file {target.name}. {done}")
         return {'FINISHED'}
+
+
+@contextlib.contextmanager
+def _restored(scene: bpy.types.Scene) -> Iterator[None]:
+    """Restores the scene's camera and resolution afterwards, whatever happens."""
+    camera, values = scene.camera, {name: getattr(scene.render, name) for name in _RESTORED}
+    try:
+        yield
+    finally:
+        scene.camera = camera
+        for name, value in values.items():
+            setattr(scene.render, name, value)
+
+
+def _write(scene: bpy.types.Scene, path: Path) -> bool:
+    """Renders the plan to a PNG or TIFF file. Returns False if the user canceled."""
+    render = scene.render
+    kept = render.filepath, render.use_file_extension, render.image_settings.file_format
+    render.filepath, render.use_file_extension = str(path), False
+    try:
+        render.image_settings.file_format = 'TIFF' if path.suffix.lower().startswith(".tif") else 'PNG'
+        return bpy.ops.render.render(write_still=True) == {'FINISHED'}
+    finally:
+        render.filepath, render.use_file_extension, render.image_settings.file_format = kept
+
+
+def _pixel(scene: bpy.types.Scene, scale: float, dpi: float) -> float:
+    """Side of a pixel in scene units."""
+    return scale * INCH / dpi / scene.unit_settings.scale_length
+
+
+def scale_for(box: tuple[np.ndarray, np.ndarray], sheet: tuple[float, float], margin: float, unit: float) -> float:
+    """The smallest N of the round scales 1 : N at which the plan fits the sheet, upright or across. unit: meters per scene unit."""
+    extent = (box[1] - box[0])[:2]
+    room = np.sort(extent + 2.0 * margin * extent.max()) * unit
+    needed = max(float((room / np.sort(sheet)).max()), 1e-3)
+    power = 10.0 ** np.floor(np.log10(needed))
+    return float(next(step * power for step in (*_STEPS, 10.0) if step * power >= needed * (1.0 - 1e-9)))
+
+
+def _size_text(scene: bpy.types.Scene, box: tuple[np.ndarray, np.ndarray], scale: float, dpi: float, margin: float) -> str:
+    """The size of the image in pixels, and of the file in megabytes before compression."""
+    width, height = _size(box, _pixel(scene, scale, dpi), margin)
+    if max(width, height) > MOST:
+        return f"{width:,} x {height:,} pixels. The most is {MOST:,} a side"
+    settings = scene.render.image_settings
+    size = width * height * 4 * (2 if settings.color_depth in {'16', '32'} else 1)
+    return f"{width:,} x {height:,} pixels, at most {size / 1e6:,.1f} MB"
 
 
 def _survey(context: Context) -> tuple[np.ndarray, float]:
@@ -117,13 +223,17 @@ def _size(box: tuple[np.ndarray, np.ndarray], pixel: float, margin: float) -> tu
     return width, height
 
 
-def _camera(context: Context, box: tuple[np.ndarray, np.ndarray], pixel: float, width: int,
+def _set_up(context: Context, camera: bpy.types.Object | None, box: tuple[np.ndarray, np.ndarray], pixel: float, width: int,
             height: int) -> bpy.types.Object:
-    """The camera "Plan", made at the first time."""
-    camera = bpy.data.objects.get("Plan")
-    if camera is None or camera.type != 'CAMERA' or camera.name not in context.scene.objects:
+    """Makes the scene render the plan. Returns the camera, a new one named "Plan" if None is given."""
+    scene, render = context.scene, context.scene.render
+    if camera is None:
         camera = bpy.data.objects.new("Plan", bpy.data.cameras.new("Plan"))
-        context.scene.collection.objects.link(camera)
+        scene.collection.objects.link(camera)
+    render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
+    render.pixel_aspect_x = render.pixel_aspect_y = 1.0
+    render.use_border = False
+    scene.camera = camera
     middle, depth = 0.5 * (box[0] + box[1]), float(box[1][2] - box[0][2])
     room = max(0.01 * depth, 10.0 * pixel)
     camera.matrix_world = Matrix.Translation((middle[0], middle[1], box[1][2] + 2.0 * room))
@@ -137,10 +247,11 @@ def _camera(context: Context, box: tuple[np.ndarray, np.ndarray], pixel: float, 
 
 def _menu(self: bpy.types.Menu, context: Context) -> None:
     if context.engine == PatinaRenderEngine.bl_idname:
-        self.layout.operator(PATINA_OT_render_plan.bl_idname, text="Render Plan to Scale...")
+        self.layout.operator(PATINA_OT_plan_sheet.bl_idname, text="Render Plan to Scale...")
 
 
 def register() -> None:
+    bpy.utils.register_class(PATINA_OT_plan_sheet)
     bpy.utils.register_class(PATINA_OT_render_plan)
     bpy.types.TOPBAR_MT_render.append(_menu)
 
@@ -148,3 +259,4 @@ def register() -> None:
 def unregister() -> None:
     bpy.types.TOPBAR_MT_render.remove(_menu)
     bpy.utils.unregister_class(PATINA_OT_render_plan)
+    bpy.utils.unregister_class(PATINA_OT_plan_sheet)

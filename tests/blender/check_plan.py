@@ -38,6 +38,41 @@ def test_plan():
         check((picture[..., 3] > 0.5).sum() == 4, "four points")
 
 
+def test_plan_restores_the_scene():
+    """A render leaves camera, resolution and objects as they were, and writes pixels. Without one, the scene keeps the plan's."""
+    scene = new_scene()
+    add_points(np.array([(0.0, 0.0, 0.0), (4.0, 3.0, 1.0)]), np.full((2, 4), 255, np.uint8)).select_set(True)
+    own = bpy.data.objects.new("own", bpy.data.cameras.new("own"))
+    scene.collection.objects.link(own)
+    scene.camera, scene.render.resolution_x, scene.render.resolution_y = own, 123, 77
+    scene.render.resolution_percentage, scene.render.use_border, scene.render.pixel_aspect_x = 50, True, 2.0
+    bpy.context.view_layer.update()
+
+    def state():
+        return (scene.camera, [getattr(scene.render, name) for name in plan._RESTORED], scene.render.filepath,
+                scene.render.image_settings.file_format, len(bpy.data.objects), len(bpy.data.cameras))
+    before, path = state(), SCRATCH / "restored.png"
+    bpy.ops.render.patina_plan(filepath=str(path), scale=100.0, dpi=254.0, margin=0.0)
+    check(state() == before, f"{state()}, not {before}")
+    picture = picture_of(path)
+    check(picture.shape[:2] == (300, 400) and (picture[..., 3] > 0.5).any(), f"{picture.shape}")
+    bpy.ops.render.patina_plan(filepath=str(path), scale=100.0, dpi=254.0, margin=0.0, write_picture=False)
+    check(scene.camera.name == "Plan" and scene.render.resolution_x == 400, "not set up")
+
+
+def test_plan_fits_the_sheet():
+    scene = new_scene()
+    box = np.zeros(3), np.array([30.0, 12.0, 5.0])
+    for sheet, unit, scale in (("A4", 1.0, 200.0), ("A3", 1.0, 100.0), ("A0", 1.0, 50.0), ("A3", 0.001, 0.1), ("A3", 1000.0, 1e5)):
+        found = plan.scale_for(box, plan.SHEETS[sheet], 0.02, unit)
+        check_close(found, scale, 1e-6 * scale, f"{sheet}, {unit}")
+        long, short = sorted(plan.SHEETS[sheet], reverse=True)
+        check(31.2 * unit / found <= long and 13.2 * unit / found <= short, "it is larger than the sheet")
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = 'PNG', '8'
+    text = plan._size_text(scene, box, 100.0, 150.0, 0.0)
+    check(text == "1,772 x 709 pixels, at most 5.0 MB", text)
+
+
 def test_plan_refuses():
     new_scene()
     for part, options in (("select objects", {}), ("the most is", {"scale": 0.001})):

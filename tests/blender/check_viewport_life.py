@@ -19,7 +19,20 @@ from mathutils import Quaternion
 from patina.draw import graphics, histogram, pace, painting, viewport
 from patina.read.importers import las
 from patina.sync.analyses.analyzing import ANALYSES
-from window import area, invoke_import, newer, screenshot, settled, setup, shown, view, window_region
+from window import (
+    area,
+    invoke_import,
+    newer,
+    override,
+    pause,
+    screenshot,
+    settled,
+    setup,
+    shown,
+    view,
+    whole_window,
+    window_region,
+)
 
 
 def test_styles_at_once_and_one_step_of_undo():
@@ -574,6 +587,28 @@ def test_a_spoilt_link_is_left_out():
     bpy.context.scene.update_tag()
     yield lambda: settled(25000)
     check(not found.notices, f"{found.notices}")
+
+
+def test_a_plan_is_one_undo_step():
+    """The dialog opens, and one undo takes back what the plan set, not what came before."""
+    scene = setup()
+    add_points(*sphere(5000, 1.0, (0, 0, 0))).select_set(True)
+    yield lambda: settled(5000)
+    with override():
+        bpy.ops.ed.undo_push(message="before")
+        check(bpy.ops.render.patina_plan_sheet('INVOKE_DEFAULT') == {'RUNNING_MODAL'}, "no dialog")
+    yield pause(0.5)
+    whole_window("plan_dialog")
+    with override():
+        size = scene.render.resolution_x
+        scene.render.resolution_y = 777
+        bpy.ops.ed.undo_push(message="height")
+        bpy.ops.render.patina_plan('EXEC_DEFAULT', True, filepath=str(SCRATCH / "undone.png"), scale=10.0, dpi=100.0, write_picture=False)
+        check(bpy.context.scene.camera.name == "Plan" and bpy.context.scene.render.resolution_x != size, "not set up")
+        bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    left = scene.camera and scene.camera.name, "Plan" in bpy.data.objects, scene.render.resolution_x, scene.render.resolution_y
+    check(left[0] != "Plan" and left[1:] == (False, size, 777), f"{left}")
 
 
 def red_pixels(picture):
