@@ -34,12 +34,18 @@ def _strays_were_hidden(scene: bpy.types.Scene) -> None:
                 del stored[name]
 
 
+def _one_sample_was_the_default(scene: bpy.types.Scene) -> None:
+    """Until version 3 a final render took one sample by default."""
+    if not scene.patina.is_property_set("samples"):
+        scene.patina.samples = 1
+
+
 def _stored(obj: bpy.types.Object) -> Any:
     """What is saved of an object's properties, by name, those that are no longer known too; like a dict."""
     return obj.patina if bpy.app.version < (5, 0, 0) else obj.patina.bl_system_properties_get() or {}
 
 
-STEPS = (_meshes_were_left_out, _strays_were_hidden)
+STEPS = (_meshes_were_left_out, _strays_were_hidden, _one_sample_was_the_default)
 
 
 def bring(scene: bpy.types.Scene) -> None:

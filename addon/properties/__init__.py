@@ -159,11 +159,12 @@ class PatinaSceneProperties(PropertyGroup):
                     "several points share a pixel. Takes two to three times as long, and mixes surfaces closer than two spacings. Has no effect on "
                     "color ramps and on points with their own opacity")
     samples: IntProperty(
-        name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
+        name="Samples", override=_OVERRIDE, default=4, min=1, soft_max=64, max=1024,
         description="Samples per pixel of a final render. Esc keeps the samples rendered so far. Data passes use one sample")
     noise: FloatProperty(
         name="Noise Threshold", override=_OVERRIDE, default=0.0, min=0.0, soft_max=0.1, max=1.0, step=0.1, precision=4,
-        description="Stop sampling once the expected color error is below this share of white. Takes at most Samples (256 if Samples is 1)")
+        description="Stop sampling once the expected color error is below this share of white. Takes at most Samples (256 if Samples is 1 or "
+                    "was never changed)")
     use_noise: switch("noise", 0.01, "Stop sampling once the image is good enough. Disabled: take all samples")
     viewport_samples: IntProperty(
         name="Viewport Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,

@@ -35,6 +35,7 @@ def test_an_old_file_keeps_its_picture():
     """A scene of before version 1 that said nothing of meshes left them out; it still does, and one that asked keeps that."""
     scene = new_scene()
     mine = scene.name
+    scene.patina.property_unset("samples")
     check(scene.patina.version == 0, "a new scene has no stamp yet")
     asked = bpy.data.scenes.new("asked")
     asked.render.engine, asked.patina.meshes = 'PATINA', 'POINTS'
@@ -46,6 +47,7 @@ def test_an_old_file_keeps_its_picture():
     scenes = bpy.data.scenes
     check([scenes[name].patina.meshes for name in (mine, "asked")] == ['OFF', 'POINTS'], "meshes")
     check(scenes[mine].patina.is_property_set("meshes"), "what was meant is written down")
+    check([scenes[name].patina.samples for name in (mine, "asked")] == [1, 1], "one sample was the default")
     check(not scenes["other"].patina.is_property_set("meshes"), "another engine's scene is left alone")
     check({scene.patina.version for scene in scenes} == {CURRENT}, "stamps")
     for name in ("asked", "other"):

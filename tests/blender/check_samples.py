@@ -70,6 +70,22 @@ def test_shown_from_the_first_on():
     check((last["Depth"] == one["Depth"]).all(), "depth is that of one sample")
 
 
+def test_a_new_scene_takes_four():
+    """Four samples by default are nearer to 64 than one is. With a noise threshold, the default is no maximum."""
+    def picture(samples=None, noise=0.0):
+        scene = scene_of(1 if samples is None else samples)
+        if samples is None:
+            scene.patina.property_unset("samples")
+        scene.patina.noise = noise
+        return render()["Combined"]
+    one, four, many, new = picture(1), picture(4), picture(64), picture()
+    check((new == four).all() and "4 samples" in stats[-1], stats[-1])
+    errors = [float(np.square(found - many).mean()) ** 0.5 for found in (one, new)]
+    check(0.0 < errors[1] < 0.75 * errors[0], f"errors of 1 and 4 samples: {errors}")
+    picture(noise=0.001)
+    check(" 4 samples" not in stats[-1], f"the default is a maximum: {stats[-1]}")
+
+
 def test_steps_are_one_go():
     """Tiles, which are made at one go, have the same pixels."""
     scene = scene_of(12)

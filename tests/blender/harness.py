@@ -122,7 +122,7 @@ def new_scene(width=64, height=48):
     render.film_transparent = True
     settings = scene.patina
     settings.fill = settings.smooth = settings.antialias = 'OFF'
-    settings.device = 'CPU'
+    settings.device, settings.samples = 'CPU', 1
     layer = scene.view_layers[0]
     layer.use_pass_z = layer.use_pass_normal = layer.patina.use_pass_source = True
     scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))

@@ -10,5 +10,5 @@ patina.fill = 'CLOSED'
 patina.fill_iterations = 0
 patina.antialias = 'LAYERS'
 patina.average = False
-patina.samples = 1
+patina.samples = 4
 patina.noise = 0.0

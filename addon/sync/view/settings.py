@@ -57,7 +57,8 @@ def shadow_file(scene: bpy.types.Scene) -> str:
 
 def samples(scene: bpy.types.Scene) -> int:
     """Of a final picture, for each pixel; 0: by the noise alone."""
-    return int(options.read().get("samples", 0)) or _at_most(scene.patina.samples, noise(scene))
+    patina = scene.patina
+    return int(options.read().get("samples", 0)) or _at_most(patina.samples, noise(scene), patina.is_property_set("samples"))
 
 
 def noise(scene: bpy.types.Scene) -> float:
@@ -70,9 +71,10 @@ def viewport_samples(scene: bpy.types.Scene) -> tuple[int, float]:
     return _at_most(scene.patina.viewport_samples, scene.patina.viewport_noise), scene.patina.viewport_noise
 
 
-def _at_most(samples: int, threshold: float) -> int:
-    """One sample has no noise to be told: with a threshold it stands for as many as it takes."""
-    return 0 if samples == 1 and threshold > 0.0 else samples
+def _at_most(samples: int, threshold: float, chosen: bool = True) -> int:
+    """The most samples. One sample has no noise to measure. With a threshold, 1 stands for as many as it takes (0), and so does the
+    default. chosen: whether the user set the number."""
+    return 0 if threshold > 0.0 and (samples == 1 or not chosen) else samples
 
 
 def _number(group: bpy.types.PropertyGroup, name: str, item: str) -> int:
