@@ -10,6 +10,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
+from ..sync.losses import MissingFile
 from . import viewport
 
 RED = (1.0, 0.05, 0.05, 1.0)
@@ -20,13 +21,19 @@ _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 _handlers: list[object] = []
 
 
+def _names(area: bpy.types.Area) -> list[str]:
+    """Of the objects whose linked file is missing, in a 3D view in Rendered shading."""
+    found = viewport.of_area(area) if area.type == 'VIEW_3D' and area.spaces.active.shading.type == 'RENDERED' else None
+    return [notice.object_name for notice in found.notices if isinstance(notice, MissingFile)] if found else []
+
+
 def _objects(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The objects without their file that the 3D view shows."""
-    found = viewport.of_area(context.area)
-    if not found or context.space_data.shading.type != 'RENDERED':
+    names = dict.fromkeys(_names(context.area))
+    if not names:
         return []
     visible = {obj.name: obj for obj in context.visible_objects}
-    return [visible[name] for name in found.missing_files() if name in visible][:MOST]
+    return [visible[name] for name in names if name in visible][:MOST]
 
 
 def _corners(obj: bpy.types.Object) -> list[Vector]:
@@ -59,7 +66,8 @@ def _draw_names() -> None:
 
 def status() -> str:
     """The line of the status bar; "" if no file is missing."""
-    names = list(dict.fromkeys(name for found in viewport.with_missing_files() for name in found.missing_files()))
+    areas = (area for window in bpy.context.window_manager.windows for area in window.screen.areas)
+    names = list(dict.fromkeys(name for area in areas for name in _names(area)))
     if not names:
         return ""
     others = f" and {len(names) - 1} more" if len(names) > 1 else ""

@@ -110,10 +110,6 @@ class Viewport:
         self._moved = time.monotonic()
         self._ask(self.pace.level, pace.MOVING if self._many else pace.EXACT)
 
-    def missing_files(self) -> list[str]:
-        """Names of the objects whose linked file is missing, each once."""
-        return list(dict.fromkeys(notice.object_name for notice in self.notices if isinstance(notice, sync.losses.MissingFile)))
-
     def draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> str:
         """Draws the last picture, asks for another one if the view moved. Returns a line of status."""
         self.area = context.area.as_pointer() if context.area else 0
@@ -454,11 +450,6 @@ def of_area(area: bpy.types.Area) -> Viewport | None:
     place = area.as_pointer() if area else 0
     found = [viewport for viewport in _VIEWPORTS if viewport.area == place and viewport.engine()]
     return next((viewport for viewport in found if viewport.shown), found[0] if found else None)
-
-
-def with_missing_files() -> list[Viewport]:
-    """Viewports whose scene lacks a linked file."""
-    return [viewport for viewport in _VIEWPORTS if viewport.engine() and viewport.missing_files()]
 
 
 def forget_points() -> None:
