@@ -632,6 +632,7 @@ def test_a_missing_link_shows_a_red_box():
     yield lambda: settled(5000)
     check(f"'{obj.name}'" in missing.status() and "missing" in missing.status(), missing.status())
     check(red_pixels(screenshot("link_missing")) > 500, "no red box")
+    whole_window("link_missing_window")
     try:
         bpy.ops.render.render()
         check(False, "no error in the report")
