@@ -19,6 +19,7 @@ TEXT = 12  # points: the size of the names
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))  # of Object.bound_box
 
 _handlers: list[object] = []
+_said = ""  # the line when the status bar was drawn last
 
 
 def _names(area: bpy.types.Area) -> list[str]:
@@ -41,6 +42,8 @@ def _corners(obj: bpy.types.Object) -> list[Vector]:
 
 
 def _draw_boxes() -> None:
+    if status() != _said and not bpy.app.timers.is_registered(_redraw_status):
+        bpy.app.timers.register(_redraw_status)
     lines = []
     for obj in _objects(bpy.context):
         corners = _corners(obj)
@@ -74,8 +77,15 @@ def status() -> str:
     return f"Patina: the linked file of '{names[0]}'{others} is missing. Use File > External Data > Find Missing Files"
 
 
+def _redraw_status() -> None:
+    """Blender redraws its status bar for no change of a scene, but when its text is set."""
+    for window in bpy.context.window_manager.windows:
+        window.workspace.status_text_set(None)
+
+
 def _draw_status(header: bpy.types.Header, _context: bpy.types.Context) -> None:
-    text = status()
+    global _said
+    _said = text = status()
     if text:
         header.layout.label(text=text, icon='ERROR')
 
@@ -89,6 +99,8 @@ def register() -> None:
 
 
 def unregister() -> None:
+    if bpy.app.timers.is_registered(_redraw_status):
+        bpy.app.timers.unregister(_redraw_status)
     if _handlers:
         for handler in _handlers:
             bpy.types.SpaceView3D.draw_handler_remove(handler, 'WINDOW')

@@ -630,6 +630,7 @@ def test_a_missing_link_shows_a_red_box():
     path.rename(elsewhere / path.name)
     bpy.context.scene.update_tag()
     yield lambda: settled(5000)
+    yield lambda: missing._said == missing.status()
     check(f"'{obj.name}'" in missing.status() and "missing" in missing.status(), missing.status())
     check(red_pixels(screenshot("link_missing")) > 500, "no red box")
     whole_window("link_missing_window")
@@ -641,6 +642,7 @@ def test_a_missing_link_shows_a_red_box():
     bpy.ops.file.find_missing_files(directory=str(elsewhere))
     bpy.context.scene.update_tag()
     yield lambda: settled(25000)
+    yield lambda: not missing._said
     check(not missing.status() and red_pixels(screenshot("link_found")) == 0, f"red although found: {missing.status()}")
 
 
