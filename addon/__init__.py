@@ -19,7 +19,7 @@ from .draw import engine, histogram, missing, overlays, render, thinned, viewpor
 from .properties import answers
 from .sync.analyses import estimates
 from .sync.objects import images, meshes
-from .sync.points import built, files
+from .sync.points import attributes, built, files
 from .sync.view import pairs
 
 _MODULES = (preferences, properties, files, migrate, pairs, overlays, missing, thinned, engine, operators, ui)
@@ -43,6 +43,7 @@ def _undone(*_) -> None:
 
 def register() -> None:
     answers.layer_distance, answers.automatic_trust = estimates.layer_distance, histogram.automatic_trust
+    answers.missing_data = attributes.missing
     answers.linked_file, answers.link_file = files.shown_text_of, files.assign
     for module in _MODULES:
         module.register()

@@ -11,6 +11,8 @@ import bpy
 layer_distance: Callable[[str], float | None] = lambda name: None
 # Name of an object → the least trust that the last image took for it.
 automatic_trust: Callable[[str], float] = lambda name: 0.0
+# Scene → what none of its clouds has and a style may need, such as "classes"; by the names in styles.Entry.needs.
+missing_data: Callable[[bpy.types.Scene], frozenset[str]] = lambda scene: frozenset()
 # Object → the file that it links, as Blender shows it; "" without one.
 linked_file: Callable[[bpy.types.Object], str] = lambda obj: ""
 # Links a file, by its path, to an object; "" removes the link.

@@ -3,20 +3,32 @@
 
 from __future__ import annotations
 
-from bpy.types import Context, PropertyGroup
+from bpy.types import Context, PropertyGroup, Scene
 
 from ..styles import styles
+from . import answers
 from .heard import EnumProperty, StringProperty
 
-_items: list[tuple[str, str, str, int, int]] = []  # Blender does not keep the strings that a callback gives it
+_Item = tuple[str, str, str, int, int]
+_lists: dict[frozenset[str], list[_Item]] = {}  # by the missing data; Blender does not keep the strings that a callback gives it
 
 
-def _list(_group: PropertyGroup | None, _context: Context | None) -> list[tuple[str, str, str, int, int]]:
-    fresh = [(entry.key, entry.label, entry.about, styles.icon(entry), number)
-             for number, entry in enumerate(styles.entries())]
-    if fresh != _items:
-        _items[:] = fresh
-    return _items
+def _list(group: PatinaStyleProperties | None, _context: Context | None) -> list[_Item]:
+    """One item per style. A style whose data no cloud of the scene has says so."""
+    missing = answers.missing_data(group.id_data) if group and isinstance(group.id_data, Scene) else frozenset()
+    fresh = [_item(entry, number, missing) for number, entry in enumerate(styles.entries())]
+    if fresh != _lists.get(missing):
+        _lists[missing] = fresh
+    return _lists[missing]
+
+
+def _item(entry: styles.Entry, number: int, missing: frozenset[str]) -> _Item:
+    label, about = entry.label, entry.about
+    lacks = next((name for name in entry.needs if name in missing), "")
+    if lacks:
+        label += f" (No {lacks.split()[-1].title()})"
+        about = f"{about}. No points of this scene have {lacks}".lstrip(". ")
+    return entry.key, label, about, styles.icon(entry), number
 
 
 def _chosen(group: PatinaStyleProperties) -> int:

@@ -69,6 +69,7 @@ class Entry:
     path: Path
     label: str
     about: str
+    needs: tuple[str, ...] = ()  # data of points without which the style shows nothing of its own: "classes", "an analysis"
 
     @property
     def own(self) -> bool:
@@ -131,9 +132,18 @@ def _entry(path: Path, _changed: int) -> Entry:
     """A file that is no style is listed by its name, and says why when it is chosen."""
     try:
         found = _parse(path)
-        return Entry(path.stem, path, _text(found.get("name")) or bpy.path.display_name(path.stem), _text(found.get("about"), 2000))
+        return Entry(path.stem, path, _text(found.get("name")) or bpy.path.display_name(path.stem), _text(found.get("about"), 2000),
+                     _needs(found.get("points")))
     except StyleError as error:
         return Entry(path.stem, path, path.stem, str(error))
+
+
+def _needs(points: Any) -> tuple[str, ...]:
+    """Data that the section "points" of a file relies on."""
+    points = points if isinstance(points, dict) else {}
+    by = points.get("soft.by") if points.get("soft.use") is True else None
+    needs = {"classes": by == 'CLASSES', "an analysis": by == 'UNCERTAINTY' or points.get("colors.source") == 'TRUST'}
+    return tuple(name for name, needed in needs.items() if needed)
 
 
 def _text(value: Any, most: int = 100) -> str:

@@ -32,6 +32,12 @@ class PatinaPanel:
         return context.engine in cls.COMPAT_ENGINES
 
 
+def shows_points(context: Context) -> bool:
+    """Whether the active object is points, or may be: modifiers make points of faces."""
+    obj = context.object
+    return point_data.may_have_points(obj) and (point_data.is_cloud(obj) or bool(obj.modifiers) or context.scene.patina.meshes == 'POINTS')
+
+
 class _PatinaObjectPanel(PatinaPanel):
     bl_context = "data"
 
@@ -172,10 +178,18 @@ class PATINA_PT_passes(PatinaPanel, Panel):
 
 
 class PATINA_PT_points(_PatinaObjectPanel, Panel):
+    """The first panel of the tab, before those of Blender: Blender sorts panels without a header first. Its `bl_order` cannot be negative."""
+
     bl_label = "Points"
+    bl_options = {'HIDE_HEADER'}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and shows_points(context)
 
     def draw(self, context: Context) -> None:
         layout = self.layout
+        layout.label(text=self.bl_label, icon='POINTCLOUD_DATA')
         layout.use_property_split = True
         patina = context.object.patina
         layout.prop(patina, "opacity")

@@ -1,24 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first lines of points, where an artist looks first: in the sidebar and in the object's own tab. All lines are in the tab of
-the object's data, below ten panels of Blender's own."""
+the object's data."""
 
 from __future__ import annotations
 
 import bpy
 from bpy.types import Context, Panel
 
-from .. import point_data
 from ..operators import add_light, convert_points
 from ..operators.clips import PATINA_OT_add_clip_box, PATINA_OT_add_clip_plane
 from . import rows, trust
-from .panels import PatinaPanel
+from .panels import PatinaPanel, shows_points
 from .statistics import SidebarPanel
-
-
-def _shows_points(context: Context) -> bool:
-    """Whether the active object is points, or may be: modifiers make points of faces."""
-    obj = context.object
-    return point_data.may_have_points(obj) and (point_data.is_cloud(obj) or bool(obj.modifiers) or context.scene.patina.meshes == 'POINTS')
 
 
 class _FirstLines:
@@ -27,7 +20,7 @@ class _FirstLines:
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return super().poll(context) and _shows_points(context)
+        return super().poll(context) and shows_points(context)
 
     def draw(self, context: Context) -> None:
         layout = self.layout

@@ -6,16 +6,20 @@ import traceback
 from types import SimpleNamespace
 
 import bpy
+import numpy as np
+import screen
 from check_panels import Drawing, Row, context_of, panels
 from harness import SCRATCH, add_light, add_points, check, sphere
+from patina import point_data
 from patina.draw import viewport
 from patina.sync.analyses.analysis import SCANNERS
 from patina.ui import rows
-from window import area, settled, setup, window_region
+from window import area, keep, settled, setup, window_region
 
 TABS = {"render": 'RENDER', "view_layer": 'VIEW_LAYER', "object": 'OBJECT', "data": 'DATA', "material": 'MATERIAL',
         "world": 'WORLD'}
 DECORATOR, ARROW, PAD = 20, 20, 8  # beside a menu's text
+MARK, FIRST = (255, 0, 255), 130  # a color; pixels: the path and the data block's name are above the first panel
 
 
 def editor():
@@ -116,6 +120,57 @@ def test_panels_are_drawn_without_errors():
         for kind, _, _ in probes:
             bpy.utils.unregister_class(kind)
         bpy.data.materials.remove(bpy.data.materials["paint"])
+
+
+def swatches():
+    """Heights of the pixels that have the color of MARK in the properties editor, from its top."""
+    editor().tag_redraw()
+    for _ in range(2):
+        bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
+    region = next(region for region in editor().regions if region.type == 'WINDOW')
+    picture = screen.settled_pixels()[region.y:region.y + region.height, region.x:region.x + region.width].astype(int)
+    keep(f"first panel {bpy.context.object.name}", picture.astype("uint8"))
+    rows_found = (abs(picture - MARK).max(axis=2) < 8).sum(axis=1) > 20
+    return [region.height - 1 - row for row in rows_found.nonzero()[0]]
+
+
+def test_points_are_the_first_panel():
+    """Of a mesh of points and of a PointCloud, in the tab of their data; not of other meshes. Blender has drawn the
+    meshes' tab before. It keeps the order in which an editor first drew panels: one that draws meshes with Patina, and then a PointCloud
+    with another engine, puts Points of PointClouds last."""
+    scene = setup()
+    mesh = bpy.data.meshes.new("faces")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    faces = bpy.data.objects.new("faces", mesh)
+    scene.collection.objects.link(faces)
+    held = [faces, add_points([(0, 0, 0)])]
+    if point_data.HAS_CLOUDS:
+        data = point_data.finished(point_data.new("cloud", np.zeros((1, 3), np.float32), True), True)
+        held.append(bpy.data.objects.new("cloud", data))
+        scene.collection.objects.link(held[-1])
+
+    def mark(panel, context):
+        panel.layout.prop(context.object, "color", text="")
+
+    panel = bpy.types.PATINA_PT_points
+    panel.prepend(mark)
+    try:
+        for obj in held:
+            obj.color = (1.0, 0.0, 1.0, 1.0)
+            select(obj)
+            if obj.type == 'MESH':
+                scene.render.engine = 'BLENDER_WORKBENCH'
+                editor().spaces[0].context = 'DATA'
+                check(not swatches(), f"{obj.name}: with another engine")
+            scene.render.engine = 'PATINA'
+            found = swatches()
+            yield None
+            if obj == faces:
+                check(not found, "of a mesh with faces")
+            else:
+                check(found and found[0] < FIRST, f"{obj.name}: the first panel begins at pixel {found[:1]}")
+    finally:
+        panel.remove(mark)
 
 
 def sidebar():

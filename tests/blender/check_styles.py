@@ -279,6 +279,33 @@ def test_selected_points_only():
     check(other.patina.lighting == 'LIT', "all")
 
 
+def test_styles_say_what_is_missing():
+    """On the tile and in the tooltip, if no cloud of the scene has the data; not once one has them."""
+    from patina.properties import style as chooser
+    scene, obj = stage()
+
+    def shown():
+        return {key: (label, about) for key, label, about, *_ in chooser._list(scene.patina.style, bpy.context)}
+
+    plain = shown()
+    check(not any("(No" in label for label, _ in plain.values()), f"{plain}")
+    obj.data.attributes.remove(obj.data.attributes["classification"])
+    found = shown()
+    check(found["vegetation"][0] == "Vegetation (No Classes)", f"{found['vegetation']}")
+    check(found["vegetation"][1] == f"{plain['vegetation'][1]}. No points of this scene have classes", f"{found['vegetation']}")
+    check([key for key in found if found[key] != plain[key]] == ["vegetation"], f"{found}")
+    scene.patina.style.chosen = "vegetation"
+    check(scene.patina.style.chosen == "vegetation", "it can still be chosen")
+    other = add_points([(0, 0, 0)], name="other")
+    other.data.attributes.new("plants", 'INT', 'POINT')
+    other.patina.colors.class_attribute = "plants"
+    check(shown() == plain, "another cloud has classes")
+    obj.patina.analysis = other.patina.analysis = 'OFF'
+    found = shown()
+    check({key: found[key][0] for key in found if found[key] != plain[key]} ==
+          {"trust": "Trust (No Analysis)", "uncertainty": "Uncertainty (No Analysis)"}, f"{found}")
+
+
 def test_imported_points_wear_the_style():
     scene, _ = stage()
     apply("museum")

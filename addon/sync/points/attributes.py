@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 import bpy
 import numpy as np
 
+from ... import point_data
+
 # Names looked for, in this order, when the artist names none.
 NORMAL_NAMES = ("normal", "Normal", "normals", "Normals", "nor", "N")
 CLASS_NAMES = ("class", "classification", "Classification", "scalar_Classification", "scalar_classification")
@@ -179,6 +181,21 @@ def classes(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
         if values is not None:
             return as_classes(values)
     return None
+
+
+def missing(scene: bpy.types.Scene) -> frozenset[str]:
+    """What no cloud of a scene has: "classes", "an analysis". Empty without clouds. Linked files and modifiers may bring classes, so
+    their clouds count as classified. Reads names of attributes only."""
+    clouds = [obj for obj in scene.objects if point_data.is_cloud(obj)]
+    found = {"classes": any(map(_may_have_classes, clouds)), "an analysis": any(obj.patina.analysis != 'OFF' for obj in clouds)}
+    return frozenset(name for name, there in found.items() if clouds and not there)
+
+
+def _may_have_classes(obj: bpy.types.Object) -> bool:
+    if obj.patina.linked_file or obj.modifiers:
+        return True
+    name = obj.patina.colors.class_attribute
+    return any(_find(obj.data, candidate, _NUMBERS) for candidate in ((name,) if name else CLASS_NAMES))
 
 
 def as_classes(values: np.ndarray) -> np.ndarray:
