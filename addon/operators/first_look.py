@@ -80,7 +80,15 @@ def _show_intensity(obj: Object) -> str:
         low, high = colors.range_of(obj, share) or (0.0, 0.0)
         if low < high:
             group.range_min, group.range_max, group.use_range = low, high, True
-    return f"'{obj.name}' is colored by '{name}'"
+    stretched = f", stretched from {group.range_min:,.6g} to {group.range_max:,.6g}" if group.use_range else ""
+    return f"'{obj.name}' is colored by '{name}'{stretched}"
+
+
+def color_imported(obj: Object, frame: int) -> str:
+    """Shows new points in their intensity if they have no colors and nobody has chosen a look. Returns what was done, or ""."""
+    if obj.patina.linked_file or obj.patina.colors.source != 'OWN' or _data(obj, frame) != Data.INTENSITY:
+        return ""
+    return _show_intensity(obj)
 
 
 def _show_scalar(obj: Object, name: str, ramp: str) -> None:

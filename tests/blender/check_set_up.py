@@ -113,6 +113,55 @@ def test_first_look_of_intensity():
     check(np.ptp(picture[..., 0][shown]) > 0.8, f"gray from {picture[..., 0][shown].min():.2f} to {picture[..., 0][shown].max():.2f}")
 
 
+def test_brightness_of_text_files():
+    """A column Grey, Gray, Intensity or Reflectance colors the points, stretched, whatever its case and its range: after Set Up, and where
+    Patina is the engine already. Other columns do not, nor does brightness where the file has colors."""
+    points, _, _ = sphere(4000, 1.0, (0, 0, 0))
+
+    def imported(column, engine, values, more=""):
+        scene = start_scene()
+        scene.render.engine = engine
+        rows = "\n".join(f"{x:.4f},{y:.4f},{z:.4f},{value:g}{more}" for (x, y, z), value in zip(points, values, strict=True))
+        path = SCRATCH / f"brightness {column.split(',')[0]}.csv"
+        path.write_text(f"x,y,z,{column}\n{rows}\n")
+        bpy.ops.import_scene.patina_points(filepath=str(path))
+        obj = bpy.context.view_layer.objects.active
+        if engine != 'PATINA':
+            check(bpy.ops.scene.patina_set_up() == {'FINISHED'}, "set up")
+        return scene, obj
+
+    wide, bytes_ = np.rint(2000 + 1500 * points[:, 2]), np.rint(100 + 50 * points[:, 2])
+    given = [("Grey", wide), ("GRAY", wide), ("Intensity", wide), ("reflectance", wide), ("Gray", bytes_)]
+    for engine, those in (('BLENDER_WORKBENCH', given[:1]), ('PATINA', given)):
+        for column, values in those:
+            scene, obj = imported(column, engine, values)
+            colors = obj.patina.colors
+            said = f"{column} with {engine}: {colors.source}, {colors.scalar}, {colors.range_min} to {colors.range_max}"
+            check((colors.source, colors.scalar.lower(), colors.ramp) == ('SCALAR', column.lower(), 'GREY'), said)
+            low, high = np.quantile(values, (0.01, 0.99))
+            check(abs(colors.range_min - low) < 20 and abs(colors.range_max - high) < 20 and colors.use_range, said)
+            if engine == 'PATINA':
+                bpy.ops.object.patina_frame_points()
+            scene.view_settings.view_transform = 'Standard'
+            scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
+            picture = render()["Combined"]
+            gray = picture[..., :3][picture[..., 3] > 0.99]
+            check(np.ptp(gray[:, 0]) > 0.8 and np.ptp(gray, axis=1).max() < 0.2, f"{said}: {gray.min(axis=0)} to {gray.max(axis=0)}")
+    _, obj = imported("amount", 'PATINA', wide)
+    check(obj.patina.colors.source == 'OWN', "another column")
+    _, obj = imported("Grey,red,green,blue", 'PATINA', wide, ",200,100,50")
+    check(obj.patina.colors.source == 'OWN', "the file has colors")
+
+
+def test_first_look_of_intensity_says_the_range():
+    from patina.operators import first_look
+    start_scene()
+    obj, = import_ply(write_ply("first_range.ply", columns_of(1.0, intensity=lambda points: 30000 + 20000 * points[:, 2])))
+    said, = (text for text in first_look.choose(bpy.context.scene, [obj]) if "intensity" in text)
+    group = obj.patina.colors
+    check(said == f"'first_range' is colored by 'intensity', stretched from {group.range_min:,.6g} to {group.range_max:,.6g}", said)
+
+
 def test_first_look_of_classes():
     start_scene()
     obj, = import_ply(write_ply("first_classes.ply", columns_of(1.0, classification=lambda points: np.where(points[:, 2] > 0, 5, 2))))
