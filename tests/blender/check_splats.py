@@ -77,6 +77,30 @@ def test_radius_attribute():
     check(any("no point attribute 'length'" in text for _, text in reports), f"reports {reports}")
 
 
+def test_radii_without_bounds():
+    """Inf, NaN and 1e30 are limited to the cloud's bounding box, and reported once; a radius within it stays, with no message."""
+    for bad in (np.inf, 1e30, np.nan):
+        scene, points, obj = discs(attribute=[0.1] * 12)
+        whole = render()["Combined"][..., 3] > 0
+        check(not any("radi" in text for _, text in reports), f"{reports}")
+        small = int(whole.sum())
+        obj.data.attributes["size"].data[0].value = bad
+        point_data.changed(obj.data)
+        covered = render()["Combined"][..., 3] > 0
+        said = [text for _, text in reports if "disc radius is not a number or larger than the cloud" in text]
+        check(len(said) == 1 and f"'{obj.name}': 1 disc" in said[0], f"{bad}: {reports}")
+        if np.isnan(bad):
+            check(0 < small - covered.sum() < small / 6, f"NaN: {covered.sum()} pixels, {small} before")
+            continue
+        most = 0.5 * np.linalg.norm(np.ptp(points, axis=0))
+        step = (pixel(scene, points[0] + [1, 0, 0])[1] - pixel(scene, points[0])[1]) * most  # pixels
+        places = np.argwhere(covered) - np.array(pixel(scene, points[0]))
+        own = np.array([pixel(scene, point) for point in points]) - np.array(pixel(scene, points[0]))
+        reach = max(step, np.linalg.norm(own, axis=1).max() + 0.1 / most * step) + 2
+        check(np.linalg.norm(places, axis=1).max() <= reach, f"{bad}: {np.linalg.norm(places, axis=1).max()} pixels away, {reach}")
+        check(not covered.all() and covered.sum() > small, f"{bad}: {covered.mean():.0%} of the image")
+
+
 def test_largest_gap():
     """Discs are no wider than the largest gap, whatever their radii."""
     scene, points, obj = discs(0.1)

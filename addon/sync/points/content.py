@@ -111,6 +111,8 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
         rgb = rgb if obj.patina.color_attribute or discs.colors is None else discs.colors
         opacities = discs.opacities if opacities is None else opacities
         radii = radii if obj.patina.radius_attribute or discs.radii is None else discs.radii
+    if radii is not None:
+        radii = _within_box(obj.name, radii, positions, notices)
     for kind, name, found in (("color", obj.patina.color_attribute, rgb),
                               ("normal", obj.patina.normal_attribute, normals),
                               ("opacity", obj.patina.opacity_attribute, opacities),
@@ -131,3 +133,18 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     scans, scan_of = scans_in({name: column[:, 0] for name in SCAN_NAMES
                                       if (column := attributes.scalars(data, count, name)) is not None})
     return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, bool(analyzed), stations, by, scans, scan_of)
+
+
+def _within_box(name: str, radii: np.ndarray, positions: np.ndarray, notices: list[str]) -> np.ndarray:
+    """The radii (n, 1), none larger than half the diagonal of the finite points' bounding box; 0 for NaN. Says how many were changed: one
+    infinite disc would cover the whole image. Points at one place keep finite radii."""
+    wrong = np.isnan(radii)
+    finite = positions[np.isfinite(positions).all(axis=1)]
+    most = 0.5 * float(np.linalg.norm(np.ptp(finite.astype(np.float64), axis=0))) if len(finite) else 0.0
+    large = radii > most if most > 0.0 else np.isposinf(radii)
+    count = int(np.count_nonzero(wrong | large))
+    if not count:
+        return radii
+    notices.append(f"'{name}': {count:,} disc radi{'us is' if count == 1 else 'i are'} not a number or larger than the cloud, and limited to it. "
+                   "Check the attribute Disc Radius")
+    return np.where(wrong, np.float32(0.0), np.where(large, np.float32(most), radii)).astype(np.float32)
