@@ -14,6 +14,7 @@ from . import (
     export_points,
     farm,
     import_points,
+    level,
     linked_points,
     plan,
     points,
@@ -32,7 +33,7 @@ from . import (
     world,
 )
 
-_MODULES = (add_light, analyze, clips, colors, import_points, addresses, export_points, combine, convert_points, farm, linked_points, plan,
+_MODULES = (add_light, analyze, clips, colors, import_points, addresses, export_points, combine, convert_points, farm, level, linked_points, plan,
             points, points_keys, points_tools, preferences, scanner, scans, set_up, shadows, soft_brush, stations, styles, untrusted,
             view_transform, world)
 

@@ -17,7 +17,7 @@ from ..read import importers
 from ..read.importers import PointFile, name_of, saved, told
 from ..styles import styles
 from ..sync.points import addresses, built, files, linked, made, origin, sequence
-from . import first_look, set_up, stations
+from . import first_look, level, set_up, stations
 from .steps import Stepped
 
 METERS = (1.0, 1.0)  # of a file's units, across and up
@@ -161,6 +161,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             if context.engine == set_up.PatinaRenderEngine.bl_idname:  # with another engine, Set Up chooses the look
                 if said := first_look.color_imported(obj, context.scene.frame_current):
                     self.report({'INFO'}, told(f"Patina: {said}"))
+            if not splats and (said := (yield from level.note(obj, self._progress))):
+                self.report({'INFO'}, told(f"Patina: {said}"))
         self._finish(context)
         count = sum(point_data.count_of(data) for data, *_ in found)
         self.report({'INFO'}, f"Imported {count:,} point{'s' * (count != 1)} from {len(found)} file{'s' * (len(found) > 1)}. "

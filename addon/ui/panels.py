@@ -211,6 +211,7 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
             elif point_data.HAS_CLOUDS:
                 column.operator("object.patina_to_point_cloud")
             column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")
+            column.operator("object.patina_level")
 
 
 class PATINA_PT_analysis(_PatinaObjectPanel, Panel):

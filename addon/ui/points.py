@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
-from ..operators import add_light, convert_points
+from ..operators import add_light, convert_points, level
 from ..operators.clips import PATINA_OT_add_clip_box, PATINA_OT_add_clip_plane
 from . import rows, trust
 from .panels import PatinaPanel, shows_points
@@ -43,6 +43,10 @@ class _FirstLines:
             layout.operator(add_light.PATINA_OT_add_light.bl_idname, icon='LIGHT_SUN')
         rows.automatic(layout, patina, "radius").active = context.scene.patina.surface in {'AUTO', 'SPLATS'} and not patina.ranges.use
         trust.draw_slider(layout, patina)
+        tilt = context.object.get(level.TILTED, 0.0)
+        if tilt:
+            rows.sentence(context, layout, f"The points seem tilted by {tilt:.0f} degrees", 'INFO')
+            layout.operator(level.PATINA_OT_level.bl_idname)
         row = layout.row(heading="Clip", align=True)
         row.use_property_decorate = False
         row.prop(colors, "use_clips", text="")

@@ -24,7 +24,7 @@ MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "chec
            "check_sequence", "check_motion", "check_panorama", "check_migrate", "check_meshes", "check_textures", "check_combine",
            "check_clouds", "check_session", "check_effects", "check_lines", "check_splats", "check_pace", "check_analysis", "check_edit_mode", "check_trust",
            "check_losses", "check_roles", "check_kept", "check_survival", "check_world", "check_materials", "check_nodes", "check_cryptomatte",
-           "check_soft", "check_soft_looks", "check_scans", "check_grids", "check_newcomers", "check_kinds", "check_farm",
+           "check_level", "check_soft", "check_soft_looks", "check_scans", "check_grids", "check_newcomers", "check_kinds", "check_farm",
            "check_security", "check_gpu")  # the last: with graphics in the background others would have them too
 # Of files, servers and processes beside Blender, or of pictures that the library alone decides: how the names begin.
 ONCE = ("analysis/once", "building/", "copc/", "ept/", "formats/", "kept/", "survival/", "linked/opens_from_its_cache", "pages/", "samples/panoramas_sample_by_sample",
