@@ -13,6 +13,7 @@ import argparse
 import contextlib
 import hashlib
 import io
+import os
 import random
 import resource
 import signal
@@ -28,6 +29,7 @@ CORPUS = Path(__file__).resolve().parent / "corpus"
 SECONDS = 5.0  # of a processor, that an input may take
 WAIT = 60  # seconds after which an input is ended
 MEMORY = 6 << 30  # bytes of addresses that the process may take
+os.environ["PATINA_POISON_PLANES"] = "1"  # of all devices of this process and of those that it starts: who reads what no pass wrote draws noise, or ends
 
 
 @dataclass
