@@ -23,7 +23,7 @@ set(TEST_WARNINGS ${WARNINGS})
 file(GLOB SUPPORT_SOURCES CONFIGURE_DEPENDS
     ${TESTS}/*.c ${TESTS}/reference/*.c ${TESTS}/kernels/*.c ${TESTS}/unit/*.c ${TESTS}/scenes/*.c ${TESTS}/hard/*.c)
 set(FOLDERS kernels unit scenes hard)
-if(CMAKE_SYSTEM_NAME STREQUAL Linux AND PATINA_GL AND NOT PATINA_TARGET)
+if(CMAKE_SYSTEM_NAME STREQUAL Linux AND NOT PATINA_TARGET)
     list(APPEND FOLDERS soak) # which asks glibc what it holds
 endif()
 list(FILTER SUPPORT_SOURCES EXCLUDE REGEX "/test_[^/]*\\.c$")

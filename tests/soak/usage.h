@@ -20,6 +20,7 @@ void usage_begin(void);
 void usage_end(void);
 struct usage usage_now(void);
 // Prints both. Fails the test if the first five are more than 1 % greater in the second; resident memory: if it is more than 1 % and 1 MB.
+// Under a sanitizer, which keeps memory of its own, neither kind of memory is held.
 void usage_compare(const char *what, const struct usage *first, const struct usage *last);
 // Counts the objects of an OpenGL device from here on. Others: nothing.
 void usage_watch(patina_device *device);
