@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "usage.h"
 #include "device_gl/device_gl.h"
+#include "sanitized.h"
 #include "scenes/support.h"
 
 #include <dirent.h>
@@ -9,14 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define MEMORY_IS_OURS 0
-#elif defined(__has_feature)
-#define MEMORY_IS_OURS (!__has_feature(address_sanitizer) && !__has_feature(thread_sanitizer) && !__has_feature(memory_sanitizer))
-#else
-#define MEMORY_IS_OURS 1
-#endif
 
 static char folder[] = "/tmp/patina-soak-XXXXXX";
 
@@ -175,13 +168,13 @@ static void hold(const char *what, const char *name, uint64_t first, uint64_t la
 
 void usage_compare(const char *what, const struct usage *first, const struct usage *last)
 {
-    if (MEMORY_IS_OURS)
+    if (!TEST_SANITIZED)
         hold(what, "bytes of memory", first->heap, last->heap, 0);
     hold(what, "handles", first->handles, last->handles, 0);
     hold(what, "threads", first->threads, last->threads, 0);
     hold(what, "temporary files", first->files, last->files, 0);
     hold(what, "objects of OpenGL", first->objects, last->objects, 0);
-    if (MEMORY_IS_OURS)
+    if (!TEST_SANITIZED)
         hold(what, "bytes resident", first->resident, last->resident, 1 << 20); // of which the system keeps no exact account
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Anonymous memory of a cloud: at most 24 bytes a point at rest (position, colour, normal), at most 16 more while it is
 // built; the caller's own arrays are not counted. Measured by the kernel's own books, not by the library's.
+#include "sanitized.h"
 #include "scene/cloud.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
@@ -90,13 +91,10 @@ static void measure(uint64_t count, unsigned columns, int doubles, double rest_l
 static void test_bytes_a_point(void **state)
 {
     (void)state;
-#if defined(__SANITIZE_ADDRESS__)
-    skip(); // its shadow and quarantine are anonymous memory too
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-    skip();
-#endif
-#endif
+    if (TEST_SANITIZED) {
+        print_message("skip test_bytes_a_point: bytes a point are not the library's under the sanitizer\n");
+        skip();
+    }
     if (!anonymous_bytes())
         skip();
     measure(200000, POINTS_ALL, 0, 25.0, 60.0); // warms allocator and threads up; small clouds round up

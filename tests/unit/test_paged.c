@@ -2,6 +2,7 @@
 // A cloud of 22 billion points, of which a thousand pages arrive: what it takes of memory and of time before a picture is drawn (SPEC 14).
 #include "base/pool.h"
 #include "plan/passes.h"
+#include "sanitized.h"
 #include "scene/paged.h"
 #include "scene/parts.h"
 #include "scenes/support.h"
@@ -152,7 +153,8 @@ static void test_billions(void **state)
     CHECK(patina_cloud_get_pages(cloud, &told), cloud);
     printf("  %llu points in %u pages, %u chunks and %u parts: %.0f ms, %.1f MB\n", (unsigned long long)told.points, count,
            cloud->chunk_count, pt_part_count(cloud), spent() - start, 1e-6 * (held() - before));
-    assert_true(told.points > 22000000000ull && cloud->part_count > 10 && held() - before < 120e6);
+    assert_true(told.points > 22000000000ull && cloud->part_count > 10);
+    assert_true(TEST_SANITIZED || held() - before < 120e6);
     uint64_t slots = 0, points = 0;
     for (uint32_t i = 0; i < cloud->part_count; i++) {
         const struct patina_cloud *part = pt_part(cloud, i);
