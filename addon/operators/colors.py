@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A custom ramp to start from, and a range without strays."""
+"""Color By, a custom ramp to start from, and a range without strays."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
+from bpy.props import StringProperty
 from bpy.types import Context, Operator
 
-from .. import jobs, native, point_data
-from ..sync.points import attributes, linked
+from .. import native, point_data
+from ..sync.points import coloring
 
 STOPS = 6  # of a custom ramp that begins as one of ours
-SHARE = 0.02  # of the points that a robust range leaves out at either end
 
 
 class _ColorOperator:
@@ -21,6 +21,29 @@ class _ColorOperator:
     @classmethod
     def poll(cls, context: Context) -> bool:
         return point_data.may_have_points(context.object)
+
+
+class PATINA_OT_color_by(_ColorOperator, Operator):
+    """Color the points by this. The range is between the 1st and 99th percentile of the values"""
+
+    bl_idname = "object.patina_color_by"
+    bl_label = "Color By"
+
+    choice: StringProperty(name="Color By", description="One of the labels that the menu Color By lists")
+
+    def execute(self, context: Context) -> set[str]:
+        obj = context.object
+        listed = {choice.label: choice for choice in coloring.choices(obj)}
+        if self.choice not in listed:
+            self.report({'ERROR'}, f"Patina: '{obj.name}' has no '{self.choice}' to color by. It has {', '.join(listed)}")
+            return {'CANCELLED'}
+        try:
+            if not coloring.apply(obj, listed[self.choice], context.scene.frame_current):
+                self.report({'WARNING'}, f"'{obj.name}': '{self.choice}' has no finite values")
+        except native.PatinaError as error:
+            self.report({'ERROR'}, f"Patina: {error}")
+            return {'CANCELLED'}
+        return {'FINISHED'}
 
 
 class PATINA_OT_new_ramp(_ColorOperator, Operator):
@@ -45,7 +68,7 @@ class PATINA_OT_new_ramp(_ColorOperator, Operator):
 
 
 class PATINA_OT_robust_range(_ColorOperator, Operator):
-    """Set the range so that 2 % of the points are below it and 2 % above, so that strays do not flatten the colors"""
+    """Set the range so that 1 % of the points are below it and 1 % above, so that strays do not flatten the colors"""
 
     bl_idname = "object.patina_robust_range"
     bl_label = "Robust Range"
@@ -54,7 +77,7 @@ class PATINA_OT_robust_range(_ColorOperator, Operator):
         obj = context.object
         group = obj.patina.colors
         try:
-            found = _linked_range(obj, context.scene.frame_current) if obj.patina.linked_file else range_of(obj, SHARE)
+            found = coloring.value_range(obj, coloring.SHARE, context.scene.frame_current)
         except native.PatinaError as error:
             self.report({'ERROR'}, f"Patina: {error}")
             return {'CANCELLED'}
@@ -66,33 +89,6 @@ class PATINA_OT_robust_range(_ColorOperator, Operator):
         return {'FINISHED'}
 
 
-def range_of(obj: bpy.types.Object, share: float) -> tuple[float, float] | None:
-    """Of what colors points that Blender holds: without a share of them at either end. None: nothing finite does."""
-    group, data = obj.patina.colors, obj.data
-    count = point_data.count_of(data)
-    if group.source == 'SCALAR':
-        values = attributes.scalars(data, count, group.scalar)
-    elif group.source in {'HEIGHT', 'OBJECT_HEIGHT'}:
-        values = attributes.positions(data, count)
-        if values is not None:
-            matrix = obj.matrix_world if group.source == 'HEIGHT' else None
-            values = values[:, 2] if matrix is None else values @ np.array(matrix[2][:3]) + matrix[2][3]
-    else:
-        values = None
-    values = None if values is None else values[np.isfinite(values)]
-    if values is None or not len(values):
-        return None
-    return tuple(float(value) for value in np.quantile(values, (share, 1.0 - share)))
-
-
-def _linked_range(obj: bpy.types.Object, frame: int) -> tuple[float, float] | None:
-    source = linked.source_of(obj, frame, [])
-    if obj.patina.colors.source != 'SCALAR' or source is None:
-        return None
-    cloud = jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
-    return cloud.scalar_range(SHARE) if cloud.has_scalars else None
-
-
 @persistent
 def _follow_ramps(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Blender tells viewports nothing of a texture: the objects that take its ramp are said to have changed."""
@@ -102,7 +98,7 @@ def _follow_ramps(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
             obj.update_tag(refresh={'OBJECT'})
 
 
-_register, _unregister = bpy.utils.register_classes_factory((PATINA_OT_new_ramp, PATINA_OT_robust_range))
+_register, _unregister = bpy.utils.register_classes_factory((PATINA_OT_color_by, PATINA_OT_new_ramp, PATINA_OT_robust_range))
 
 
 def register() -> None:

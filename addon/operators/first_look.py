@@ -10,11 +10,10 @@ import bpy
 from bpy.types import Object, Scene
 
 from .. import jobs, native, point_data
-from ..sync.points import attributes, linked
-from . import colors, view_transform
+from ..sync.points import attributes, coloring, linked
+from . import view_transform
 
 PLASTER = "plaster"  # the style of points that have positions alone
-SHARE = 0.01  # of the points that the stretch of intensity leaves out at either end
 
 
 class Data(Enum):
@@ -55,9 +54,10 @@ def choose(scene: Scene, points: Sequence[Object]) -> list[str]:
         return ["The points have no colors: the style Plaster lights them"]
     for obj, kind in kinds.items():
         if kind == Data.INTENSITY:
-            said.append(_show_intensity(obj))
+            said.append(_show_intensity(obj, scene.frame_current))
         elif kind == Data.CLASSES:
-            _show_scalar(obj, next(name for name in attributes.CLASS_NAMES if name in obj.data.attributes), 'CLASSES')
+            name = next(name for name in attributes.CLASS_NAMES if name in obj.data.attributes)
+            coloring.apply(obj, coloring.Choice("Class", 'SCALAR', name, 'CLASSES'), scene.frame_current)
             said.append(f"'{obj.name}' is colored by its classes")
     if any(kind != Data.POSITIONS for kind in kinds.values()) and view_transform.changes_colors(scene):
         bpy.ops.render.patina_true_colors()
@@ -72,14 +72,10 @@ def _data(obj: Object, frame: int) -> Data:
         return Data.COLORS  # the viewport reports the file
 
 
-def _show_intensity(obj: Object) -> str:
+def _show_intensity(obj: Object, frame: int) -> str:
     name = attributes.intensity_name(obj.data)
-    _show_scalar(obj, name, 'GREY')
+    coloring.apply(obj, coloring.Choice("Intensity", 'SCALAR', name, 'GREY'), frame)
     group = obj.patina.colors
-    for share in (0.0, SHARE):
-        low, high = colors.range_of(obj, share) or (0.0, 0.0)
-        if low < high:
-            group.range_min, group.range_max, group.use_range = low, high, True
     stretched = f", stretched from {group.range_min:,.6g} to {group.range_max:,.6g}" if group.use_range else ""
     return f"'{obj.name}' is colored by '{name}'{stretched}"
 
@@ -88,11 +84,4 @@ def color_imported(obj: Object, frame: int) -> str:
     """Shows new points in their intensity if they have no colors and nobody has chosen a look. Returns what was done, or ""."""
     if obj.patina.linked_file or obj.patina.colors.source != 'OWN' or _data(obj, frame) != Data.INTENSITY:
         return ""
-    return _show_intensity(obj)
-
-
-def _show_scalar(obj: Object, name: str, ramp: str) -> None:
-    group = obj.patina.colors
-    group.scalar, group.source, group.ramp = name, 'SCALAR', ramp
-    if obj.patina.lighting == 'AUTO':
-        obj.patina.lighting = 'UNLIT'
+    return _show_intensity(obj, frame)

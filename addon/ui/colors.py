@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import bpy
-from bpy.types import Context, Panel
+from bpy.types import Context, Menu, Object, Panel, UILayout
 
 from .. import point_data
 from ..properties.colors import CLASS_NAMES, class_name
+from ..sync.points import coloring
 from .panels import PatinaPanel
 
 
@@ -22,6 +23,28 @@ class ColorPanel(PatinaPanel):
         return super().poll(context) and point_data.may_have_points(context.object)
 
 
+class PATINA_MT_color_by(Menu):
+    """Lists what the points of the active object can be colored by"""
+
+    bl_idname = "PATINA_MT_color_by"
+    bl_label = "Color By"
+
+    def draw(self, context: Context) -> None:
+        layout, obj = self.layout, context.object
+        for choice in coloring.choices(obj):
+            layout.operator("object.patina_color_by", text=choice.label).choice = choice.label
+        if not obj.patina.linked_file and "spacing" not in obj.data.attributes:
+            layout.separator()
+            layout.operator("object.patina_analyze", text="Analyze for Spacing, Thickness, Kind")
+
+
+def draw_color_by(layout: UILayout, obj: Object) -> None:
+    """The row that shows what the points are colored by, and opens the menu."""
+    row = layout.row(heading="Color By")
+    row.use_property_decorate = False
+    row.menu(PATINA_MT_color_by.bl_idname, text=coloring.current(obj))
+
+
 class PATINA_PT_color(ColorPanel, Panel):
     bl_label = "Color"
 
@@ -30,7 +53,7 @@ class PATINA_PT_color(ColorPanel, Panel):
         layout.use_property_split = True
         obj = context.object
         group = obj.patina.colors
-        layout.prop(group, "source", text="Source")
+        draw_color_by(layout, obj)
         if group.source == 'OWN':
             if not obj.patina.linked_file:
                 layout.prop_search(obj.patina, "color_attribute", obj.data, "attributes", text="Attribute")
@@ -130,4 +153,4 @@ class PATINA_PT_clip(PatinaPanel, Panel):
 
 
 register, unregister = bpy.utils.register_classes_factory(
-    (PATINA_PT_color, PATINA_PT_classes, PATINA_PT_cuts, PATINA_PT_clip))
+    (PATINA_MT_color_by, PATINA_PT_color, PATINA_PT_classes, PATINA_PT_cuts, PATINA_PT_clip))

@@ -10,6 +10,7 @@ from bpy.types import Context, Panel
 from ..operators import add_light, convert_points, level
 from ..operators.clips import PATINA_OT_add_clip_box, PATINA_OT_add_clip_plane
 from . import rows, trust
+from .colors import draw_color_by
 from .panels import PatinaPanel, shows_points
 from .statistics import SidebarPanel
 
@@ -31,7 +32,7 @@ class _FirstLines:
         patina = context.object.patina
         colors = patina.colors
         column = layout.column()
-        column.prop(colors, "source", text="Color")
+        draw_color_by(column, context.object)
         if colors.source == 'FIXED':
             column.prop(patina, "color", text=" ")
         elif colors.source != 'OWN':

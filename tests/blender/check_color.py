@@ -11,6 +11,7 @@ from check_points import grid, pixel
 from harness import SCRATCH, add_points, check, check_close, drawn, linear, new_scene, render, reports, stats
 from mathutils import Matrix, Vector
 from patina import native
+from patina.sync.points import coloring
 
 GREEN = (30, 180, 90, 255)
 
@@ -120,7 +121,62 @@ def test_robust_range():
     check(bpy.ops.object.patina_robust_range() == {'FINISHED'}, "a range was found")
     colors = obj.patina.colors
     check(colors.use_range and colors.range_min < 1.0, f"range {colors.range_min} {colors.range_max}")
-    check_close(colors.range_min, np.quantile(values, 0.02), 1e-4, "2 % below")
+    check_close(colors.range_min, np.quantile(values, 0.01), 1e-4, "1 % below")
+
+
+def test_color_by():
+    """The menu lists what the cloud has and nothing else; each entry shows its values between the 1st and 99th percentile."""
+    values = np.append(np.linspace(0, 10, 11), 1e6)
+    scene, points, obj = scene_of_numbers(values)
+    bpy.context.view_layer.objects.active = obj
+    colors = obj.patina.colors
+
+    def listed():
+        return [choice.label for choice in coloring.choices(obj)]
+
+    always = ["Color", "One Color", "Height", "Local Height", "Distance from Camera", "Trust"]
+    check(listed() == [*always[:2], "Intensity", *always[2:]], f"listed {listed()}")
+    try:
+        bpy.ops.object.patina_color_by(choice="Class")
+        check(False, "a class that it does not have")
+    except RuntimeError as error:
+        check("has no 'Class'" in str(error), str(error))
+    for name, kind, found in (("classification", 'INT', np.arange(12) % 4 + 2), ("gps_time", 'FLOAT', np.arange(12)),
+                              ("scan", 'INT', np.arange(12) % 3), ("height_above_ground", 'FLOAT', np.arange(12)),
+                              ("distance", 'FLOAT', np.linspace(-1, 3, 12)), ("mine", 'FLOAT', np.arange(12))):
+        obj.data.attributes.new(name, kind, 'POINT').data.foreach_set(
+            "value", np.asarray(found, np.int32 if kind == 'INT' else np.float32))
+    obj.data.attributes.new("Normal", 'FLOAT_VECTOR', 'POINT').data.foreach_set("vector", np.tile(np.float32((0, -0.6, 0.8)), 12))
+    wanted = ["Intensity", "Class", "Scan", "Time", "Height Above Ground", "Distance to Other", "mine", "Normal"]
+    check(listed() == [*always[:2], *wanted, *always[2:]], f"listed {listed()}")
+
+    place = pixel(scene, points[5])
+    for label, name, ramp in (("Intensity", "intensity", 'GREY'), ("Time", "gps_time", 'VIRIDIS'), ("Distance to Other", "distance", 'DIVERGING')):
+        check(bpy.ops.object.patina_color_by(choice=label) == {'FINISHED'}, label)
+        check((colors.source, colors.scalar, colors.ramp, colors.use_range) == ('SCALAR', name, ramp, True), label)
+        check(coloring.current(obj) == label, f"{coloring.current(obj)} is shown")
+        held = np.empty(12, np.float32)
+        obj.data.attributes[name].data.foreach_get("value", held)
+        low, high = np.quantile(held, (0.01, 0.99))
+        if ramp == 'DIVERGING':
+            low, high = -max(-low, high), max(-low, high)
+        check_close((colors.range_min, colors.range_max), (low, high), 1e-3 * high, label)
+        table = native.ramp(ramp.lower())
+        share = np.clip((held[5] - low) / (high - low), 0, 1) * 255
+        expected = [np.interp(share, np.arange(256), table[:, i]) for i in range(3)]
+        check_close(render()["Combined"][place][:3], expected, 1e-3, label)
+    bpy.ops.object.patina_color_by(choice="Class")
+    check(colors.ramp == 'CLASSES' and not colors.use_range, "classes have no range")
+    check_close(render()["Combined"][place][:3], native.ramp("classes")[5 % 4 + 2], 1e-4, "the color of its class")
+    bpy.ops.object.patina_color_by(choice="Normal")
+    check(coloring.current(obj) == "Normal", coloring.current(obj))
+    check_close(render()["Combined"][place][:3], (0.5, 0.2, 0.9), 1e-5, "normals of -1 to 1 are colors of 0 to 1")
+    bpy.ops.object.patina_color_by(choice="Color")
+    check_close(render()["Combined"][place][:3], linear(GREEN[:3]), 2e-6, "its own colors again")
+    bpy.ops.object.patina_color_by(choice="Height")
+    heights = points[:, 2] if points.ndim == 2 else points
+    check_close((colors.range_min, colors.range_max), np.quantile(heights, (0.01, 0.99)), 1e-4, "range of heights") if colors.use_range \
+        else check(np.ptp(heights) == 0, "a range of heights")
 
 
 def test_hidden_classes():
@@ -163,7 +219,11 @@ def test_after_import():
         check(bool(obj.patina.linked_file) == link, "linked as asked")
         obj.patina.lighting = 'UNLIT'
         colors = obj.patina.colors
-        colors.source, colors.scalar, colors.ramp = 'SCALAR', "intensity", 'GREY'
+        check(bpy.ops.object.patina_color_by(choice="Intensity") == {'FINISHED'} and colors.use_range, f"by intensity, link {link}")
+        labels = [choice.label for choice in coloring.choices(obj) if choice.label != "Color"]
+        check(labels[:3] == ["One Color", "Intensity", "Class"], f"{labels} are listed, link {link}")
+        check((colors.source, colors.scalar, colors.ramp) == ('SCALAR', "intensity", 'GREY'), f"set, link {link}")
+        colors.use_range = False
         picture = render()
         grey = native.ramp("grey")
         for i, point in enumerate(points):

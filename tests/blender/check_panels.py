@@ -205,13 +205,13 @@ def test_first_lines():
         lines = [drawn for cls, drawn in found.items() if cls.bl_label == "Points"]
         check(len(lines) == 1, f"{place}: {[cls.__name__ for cls in found]}")
         names = [name for kind, owner, name, _ in lines[0] if owner is not None]
-        check(names == ["source", "opacity", "lighting", "use_radius", "use_least_trust", "use_clips"], f"{place}: {names}")
+        check(names == ["opacity", "lighting", "use_radius", "use_least_trust", "use_clips"], f"{place}: {names}")
         obj.patina.use_radius = True
         obj.patina.colors.source = 'HEIGHT'
         _, found = of_points(place)
         panel = next(cls for cls in found if cls.bl_label == "Points")
         names = [name for _, owner, name, _ in drawn_by(panel, context_of(obj)) if owner is not None]
-        check(names == ["source", "ramp", "opacity", "lighting", "use_radius", "radius", "radius", "use_least_trust", "use_clips"], f"{place}: {names}")
+        check(names == ["ramp", "opacity", "lighting", "use_radius", "radius", "radius", "use_least_trust", "use_clips"], f"{place}: {names}")
 
 
 def test_first_lines_are_of_points():

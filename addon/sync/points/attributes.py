@@ -79,7 +79,8 @@ def normals(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
 def colors(data: bpy.types.ID, count: int, name: str, pause: Callable[[], None] = lambda: None) -> np.ndarray | None:
     """Of the named attribute, or of the one Blender would render, or of a usual name.
 
-    Byte colours stay 8-bit sRGB (uint8); float colours are linear. A plain vector counts only when named. pause() is called
+    Byte colours stay 8-bit sRGB (uint8); float colours are linear. A plain vector counts only when named. Normals of -1 to 1 become
+    colors of 0 to 1. pause() is called
     during long steps and may raise.
     """
     if name:
@@ -88,6 +89,9 @@ def colors(data: bpy.types.ID, count: int, name: str, pause: Callable[[], None] 
         attribute = next(_color_candidates(data), None)
     if attribute is None:
         return None
+    if name in NORMAL_NAMES and attribute.data_type == 'FLOAT_VECTOR':
+        values = _values(attribute, count)
+        return None if values is None else np.float32(0.5) * values + np.float32(0.5)
     if attribute.data_type != 'BYTE_COLOR':
         return _values(attribute, count)
     values = _in_place(attribute, count, pause)
