@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ... import jobs, native, point_data
+from ... import jobs, point_data
 from ..analyses.scans_of import SCAN_NAMES
 from . import attributes, linked
 
