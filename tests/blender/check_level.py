@@ -61,9 +61,10 @@ def test_level_turns_upright():
 
 
 def test_upright_and_unknown_stay():
-    """An upright room and a ball without planes are left alone; the ball with a message."""
+    """An upright room, a ball without planes and a slope without walls are left alone; the last two with a message."""
     new_scene()
-    for name, points in (("room", turned(0.0)), ("ball", sphere(8000, 1.0, (0, 0, 0))[0])):
+    slope = np.random.default_rng(4).uniform((0, 0, 0), (100, 100, 0.05), (20_000, 3)) @ np.array(Matrix.Rotation(math.radians(5), 3, 'X')).T
+    for name, points in (("room", turned(0.0)), ("slope", slope), ("ball", sphere(8000, 1.0, (0, 0, 0))[0])):
         obj = add_points(points, name=name)
         bpy.context.view_layer.objects.active = obj
         before = obj.matrix_world.copy()

@@ -16,6 +16,7 @@ POINTS = 30_000  # that are analyzed, a random choice of all
 CANDIDATES = 300  # normals that are tried as the direction of a plane
 NEAR = math.radians(6.0)  # between a normal and the plane that it counts to
 LEAST_LEVEL = 0.05  # of the area: horizontal planes, without which nothing is known of the vertical
+LEAST_WALLS = 0.1  # of the area: vertical planes, without which a slope would count as a tilted floor
 LEAST_EXPLAINED = 0.6  # of the area: horizontal and vertical planes together
 COMPARABLE = 0.9  # of what the best direction explains: directions that explain so much are compared by their largest plane
 CLEARLY = 2.0  # times as large a plane, for a direction farther than TILT from the present one to be preferred
@@ -64,8 +65,9 @@ def of_planes(places: np.ndarray, normals: np.ndarray, areas: np.ndarray, up: np
     shares = areas / areas.sum()
     axes = _axes(normals, shares)
     level = [_level(normals, shares, axis) for axis in axes]
-    explained = [part + _upright(normals, shares, axis) for part, axis in zip(level, axes, strict=True)]
-    good = [i for i in range(len(axes)) if level[i] >= LEAST_LEVEL and explained[i] >= max(LEAST_EXPLAINED, COMPARABLE * max(explained))]
+    walls = [_upright(normals, shares, axis) for axis in axes]
+    explained = [sum(parts) for parts in zip(level, walls, strict=True)]
+    good = [i for i in range(len(axes)) if level[i] >= LEAST_LEVEL and walls[i] >= LEAST_WALLS and explained[i] >= max(LEAST_EXPLAINED, COMPARABLE * max(explained))]
     if not good:
         return None
     nearest = max(good, key=lambda i: abs(axes[i] @ up))
