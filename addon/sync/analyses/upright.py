@@ -70,11 +70,13 @@ def of_planes(places: np.ndarray, normals: np.ndarray, areas: np.ndarray, up: np
     good = [i for i in range(len(axes)) if level[i] >= LEAST_LEVEL and walls[i] >= LEAST_WALLS and explained[i] >= max(LEAST_EXPLAINED, COMPARABLE * max(explained))]
     if not good:
         return None
-    nearest = max(good, key=lambda i: abs(axes[i] @ up))
     largest = [_largest(places, normals, shares, axis) for axis in axes]
-    best = max(good, key=lambda i: largest[i])
-    if math.acos(min(abs(axes[nearest] @ up), 1.0)) < TILT and largest[best] < CLEARLY * largest[nearest]:
-        best = nearest
+    best, present = max(good, key=lambda i: largest[i]), [i for i in range(len(axes)) if abs(axes[i] @ up) > math.cos(TILT)]
+    if best not in present and any(largest[best] < CLEARLY * largest[i] for i in present):
+        present = [i for i in present if i in good]
+        if not present:
+            return None  # a slope without walls, for example
+        best = present[0]
     axis = axes[best] * (1.0 if axes[best] @ up >= 0.0 else -1.0)
     tilt = math.acos(min(float(axis @ up), 1.0))
     if tilt > TILT:  # either end may be up: most of the floor is below the middle
