@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from .lighting import Headlight, Light
+from .marks import Marks
 from .meshes import MeshItem
 from .points import CloudItem
 from .settings import DeviceChoice, Effects, Lines, Settings
@@ -39,3 +40,4 @@ class SceneDescription:
     behind: Surroundings | None  # what is seen behind all, by direction; None: the settings' background, or a transparent film
     shadow_file: str  # baked shadow textures; empty: none
     notices: list[str]  # what the artist should know about things left out, a sentence each
+    marks: Marks | None = None  # written over the image

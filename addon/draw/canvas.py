@@ -12,7 +12,8 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from mathutils import Color
 
-from . import graphics, overlays, painting, sky
+from ..description.marks import Marks
+from . import graphics, marks, overlays, painting, sky
 from .pictures import Shown
 
 HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that a depth is nearer than the surface: Blender's dots of vertices are hidden, or not
@@ -27,6 +28,7 @@ class Canvas:
         self._chosen: np.ndarray | None = None  # places of vertices that are selected in Edit Mode
         self._chosen_batch: gpu.types.GPUBatch | None = None
         self._sky = sky.Sky()
+        self._marks: tuple[tuple[Marks, int, int], gpu.types.GPUTexture] | None = None
 
     def choose(self, places: np.ndarray | None) -> None:
         """Vertices that are selected in Edit Mode, which are drawn over the picture."""
@@ -34,7 +36,7 @@ class Canvas:
 
     def clear(self) -> None:
         """Frees the textures."""
-        self.drawn = self._chosen_batch = None
+        self.drawn = self._chosen_batch = self._marks = None
         self._sky = sky.Sky()
 
     def draws(self, shown: Shown) -> bool:
@@ -76,6 +78,21 @@ class Canvas:
             self._hide_overlays(context, 'DEPTH')
         if not overlays.KEEPS_DEPTH or self._chosen is not None:
             overlays.after(context.region, finish)
+
+    def draw_marks(self, context: bpy.types.Context, shown: Marks | None) -> None:
+        """Draws legends, scale bar, north arrow and title over the whole region, where it shows overlays. GraphicsError."""
+        if shown is None or not context.space_data.overlay.show_overlays:
+            self._marks = None
+            return
+        key = (shown, context.region.width, context.region.height)
+        if self._marks is None or self._marks[0] != key:
+            self._marks = (key, graphics.texture(marks.paint(*key), 'RGBA16F'))
+        gpu.state.depth_test_set('NONE')
+        gpu.state.blend_set('ALPHA_PREMULT')
+        try:
+            painting.fill_rectangle([-1.0, -1.0, 1.0, 1.0], 'EXACT', self._marks[1])
+        finally:
+            gpu.state.blend_set('NONE')
 
     def _hide_overlays(self, context: bpy.types.Context, kind: str) -> None:
         """Hides the overlays behind the picture: by a depth that Blender tests them against, or ERASE: those that are drawn already."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..description.scene import SceneDescription
 from ..native import MOST_LAYERS
-from . import cryptomatte
+from . import cryptomatte, marks
 
 # What Blender's engines write where nothing is: infinity would make NaN in the compositor's arithmetic.
 DEPTH_OF_NOTHING = np.float32(1e10)
@@ -118,8 +118,21 @@ def _of_layer(number: int) -> tuple[RenderPass, ...]:
             RenderPass(f"Layer {number} Normal", 3, "XYZ", 'VECTOR', f"NORMAL {number}", wanted))
 
 
+def _full(scene: SceneDescription) -> int:
+    return 0 if scene.panorama else scene.settings.width
+
+
+def _burned(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
+    return marks.over(scene.marks, plane, _full(scene)) if scene.marks and scene.marks.burn else plane
+
+
+def _overlay(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
+    return marks.paint(scene.marks, plane.shape[1], plane.shape[0], _full(scene)) if scene.marks else np.zeros_like(plane)
+
+
 PASSES = (
-    RenderPass("Combined", 4, "RGBA", 'COLOR', "COMBINED", lambda layer: True),
+    RenderPass("Combined", 4, "RGBA", 'COLOR', "COMBINED", lambda layer: True, _burned),
+    RenderPass("Overlay", 4, "RGBA", 'COLOR', "COMBINED", lambda layer: layer.patina.use_pass_overlay, _overlay),
     RenderPass("Depth", 1, "Z", 'VALUE', "DEPTH", lambda layer: layer.use_pass_z, _depth),
     RenderPass("Mist", 1, "Z", 'VALUE', "DEPTH", lambda layer: layer.use_pass_mist, _mist),
     RenderPass("Position", 3, "XYZ", 'VECTOR', "DEPTH", lambda layer: layer.use_pass_position, _position),

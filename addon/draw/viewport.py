@@ -125,6 +125,7 @@ class Viewport:
         self._await_size()
         if self.shown:
             self._draw_picture(context)
+            self.canvas.draw_marks(context, sync.view_marks(context.scene, view, self.shown.clouds))
         return self._status()
 
     def _await_size(self) -> None:

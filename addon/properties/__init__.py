@@ -19,6 +19,7 @@ from .colors import PatinaColorProperties
 from .effects import PatinaEffectsProperties
 from .heard import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
 from .lines import PatinaLinesProperties
+from .marks import PatinaMarksProperties
 from .numbers import attribute_names
 from .points import PatinaPointsProperties, PatinaScanProperties
 from .ranges import PatinaRangeProperties
@@ -44,6 +45,7 @@ class PatinaSceneProperties(PropertyGroup):
     studio: PointerProperty(type=PatinaStudioProperties, override=_OVERRIDE)
     effects: PointerProperty(type=PatinaEffectsProperties, override=_OVERRIDE)
     lines: PointerProperty(type=PatinaLinesProperties, override=_OVERRIDE)
+    marks: PointerProperty(type=PatinaMarksProperties, override=_OVERRIDE)
     surface: EnumProperty(
         name="Surface", override=_OVERRIDE, default='AUTO',
         description="How the points become a surface",
@@ -358,13 +360,16 @@ class PatinaViewLayerProperties(PropertyGroup):
         name="Disagreement", default=False, update=_update_passes, override=_OVERRIDE,
         description="Distance between scans along the surface normal, in scene units, for range images. Shows registration errors. 0 where one scan "
                     "is alone")
+    use_pass_overlay: BoolProperty(
+        name="Overlay", default=False, update=_update_passes, override=_OVERRIDE,
+        description="Legends, scale bar, north arrow and title, with transparency, to lay over the image")
     pass_layers: IntProperty(
         name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
         description="Number of surface layers whose color, depth and normal become separate passes, nearest first, also behind opaque surfaces")
 
 
 _CLASSES = (PatinaScanProperties, PatinaPointsProperties, PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
-            PatinaLinesProperties, PatinaColorProperties, PatinaSoftProperties, PatinaRangeProperties, PatinaClipProperties, PatinaSceneProperties,
+            PatinaLinesProperties, PatinaMarksProperties, PatinaColorProperties, PatinaSoftProperties, PatinaRangeProperties, PatinaClipProperties, PatinaSceneProperties,
             PatinaObjectProperties, PatinaViewLayerProperties, PatinaWorldProperties, PatinaBrushProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties),
            (World, PatinaWorldProperties))

@@ -61,6 +61,9 @@ class PatinaColorProperties(PropertyGroup):
                              description="Value at the start of the ramp")
     range_max: FloatProperty(name="To", override=_OVERRIDE, default=1.0, precision=3,
                              description="Value at the end of the ramp")
+    use_legend: BoolProperty(
+        name="Legend", override=_OVERRIDE, default=False,
+        description="Show the colors and their values over the image: in the viewport, in the Overlay pass, and in the image if Burn In is enabled")
     exposure: FloatProperty(
         name="Exposure", override=_OVERRIDE, default=0.0, soft_min=-5.0, soft_max=5.0, min=-32.0, max=32.0,
         description="Exposure of the points' colors before lighting, in stops")

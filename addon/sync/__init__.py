@@ -23,12 +23,13 @@ from .points import clouds
 from .points.built import Pending, PendingLink
 from .points.style import style_of
 from .points.taking import TakingNow, Trusted, changed_owners
-from .view import clipping, clips, effects, lines, settings
+from .view import clipping, clips, effects, lines, marks, settings
 from .view.camera import CameraError, final_view, viewport_view
 from .view.clips import of_view as view_clips
+from .view.marks import read as view_marks
 
 __all__ = ["CameraError", "Pending", "PendingLink", "Trusted", "World", "changed_owners", "describe", "describe_items",
-           "describe_viewport", "final_view", "style_of", "view_clips", "viewport_view"]
+           "describe_viewport", "final_view", "style_of", "view_clips", "view_marks", "viewport_view"]
 
 
 def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, float], bool],
@@ -85,4 +86,5 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
         behind=behind,
         shadow_file=settings.shadow_file(scene),
         notices=notices,
+        marks=marks.read(scene, view, points),
     )

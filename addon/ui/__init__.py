@@ -9,6 +9,7 @@ from . import (
     cryptomatte,
     effects,
     lines,
+    marks,
     materials,
     motion,
     panels,
@@ -28,7 +29,7 @@ from . import (
 )
 
 # What makes the look comes first, then how it is drawn.
-_MODULES = (presets, styles, lines, effects, panels, sampling, cryptomatte, points, trust, colors, soft, ranges, scan_points, motion, combine, panorama,
+_MODULES = (presets, styles, lines, effects, panels, sampling, marks, cryptomatte, points, trust, colors, soft, ranges, scan_points, motion, combine, panorama,
             sequence, materials, world, statistics, standard)
 
 

@@ -93,6 +93,7 @@ class PATINA_PT_color(ColorPanel, Panel):
         if group.use_range:
             column.prop(group, "range_min")
             column.prop(group, "range_max")
+        layout.prop(group, "use_legend")
 
 
 class PATINA_PT_classes(ColorPanel, Panel):

@@ -174,6 +174,7 @@ class PATINA_PT_passes(PatinaPanel, Panel):
         column.prop(layer.patina, "use_pass_thickness")
         column.prop(layer.patina, "use_pass_density")
         column.prop(layer.patina, "use_pass_disagreement")
+        column.prop(layer.patina, "use_pass_overlay")
         layout.prop(layer.patina, "pass_layers")
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parent.parent)]
 
 MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "check_layers", "check_shadows", "check_final",
-           "check_samples", "check_plan", "check_color", "check_clip", "check_panels", "check_styles", "check_import", "check_formats",
+           "check_samples", "check_plan", "check_color", "check_marks", "check_clip", "check_panels", "check_styles", "check_import", "check_formats",
            "check_linked", "check_building", "check_copc", "check_pages", "check_ept", "check_edits", "check_files", "check_places",
            "check_preferences", "check_set_up",
            "check_sequence", "check_motion", "check_panorama", "check_migrate", "check_meshes", "check_textures", "check_combine",
