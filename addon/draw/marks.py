@@ -102,7 +102,7 @@ def paint(marks: Marks, width: int, height: int, full: int = 0) -> np.ndarray:
     if marks.bar:
         _bar(sheet, marks.bar.share * (full or width), marks.bar.text, margin)
     if marks.north is not None:
-        _arrow(sheet, marks.north, margin + 1.8 * size, height - margin - 1.8 * size)
+        _arrow(sheet, marks.north, margin + 1.8 * size, margin + 5.1 * size)  # above the bar; Blender's tools are at the upper left
     return sheet.pixels
 
 
