@@ -80,17 +80,22 @@ class Canvas:
             overlays.after(context.region, finish)
 
     def draw_marks(self, context: bpy.types.Context, shown: Marks | None) -> None:
-        """Draws legends, scale bar, north arrow and title over the whole region, where it shows overlays. GraphicsError."""
+        """Draws legends, scale bar, north arrow and title where the view shows overlays: over the part that no header and
+        no sidebar covers. GraphicsError."""
         if shown is None or not context.space_data.overlay.show_overlays:
             self._marks = None
             return
-        key = (shown, context.region.width, context.region.height)
+        region = context.region
+        right, top = _free(context.area, region)
+        key = (shown, region.width - right, region.height - top)
+        if min(key[1:]) < 1:
+            return
         if self._marks is None or self._marks[0] != key:
-            self._marks = (key, graphics.texture(marks.paint(*key), 'RGBA16F'))
+            self._marks = (key, graphics.texture(marks.paint(*key, region.width), 'RGBA16F'))
         gpu.state.depth_test_set('NONE')
         gpu.state.blend_set('ALPHA_PREMULT')
         try:
-            painting.fill_rectangle([-1.0, -1.0, 1.0, 1.0], 'EXACT', self._marks[1])
+            painting.fill_rectangle([-1.0, -1.0, 2.0 * key[1] / region.width - 1.0, 2.0 * key[2] / region.height - 1.0], 'EXACT', self._marks[1])
         finally:
             gpu.state.blend_set('NONE')
 
@@ -145,6 +150,19 @@ class Canvas:
         shader.uniform_float("projection", (*projection, packed if orthographic else -packed))
         self._chosen_batch.draw(shader)
         gpu.state.program_point_size_set(False)
+
+
+def _free(area: bpy.types.Area, region: bpy.types.Region) -> tuple[int, int]:
+    """Pixels of the region that a sidebar covers at the right, and headers at the top."""
+    right = top = 0
+    for other in area.regions:
+        if other.width < 2 or other.height < 2:  # hidden
+            continue
+        if other.type == 'UI' and other.x > region.x:
+            right = max(right, region.x + region.width - other.x)
+        if other.type in {'HEADER', 'TOOL_HEADER'} and other.y > region.y + region.height // 2:
+            top = max(top, region.y + region.height - other.y)
+    return max(right, 0), max(top, 0)
 
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:
