@@ -5,7 +5,9 @@ Images are (height, width, 4) float32, linear and premultiplied, the lowest row 
 
 from __future__ import annotations
 
+import io
 import math
+import zipfile
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,13 +21,19 @@ _INK, _PAPER = (0.95, 0.95, 0.95), (0.012, 0.012, 0.012)
 _VEIL = 0.62  # opacity of the panel behind text
 
 
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of an .npz file. Objects that would have to be unpickled are refused."""
+    with zipfile.ZipFile(path) as archive:
+        return {Path(name).stem: np.lib.format.read_array(io.BytesIO(archive.read(name))) for name in archive.namelist()}
+
+
 class _Glyphs:
     def __init__(self) -> None:
-        with np.load(Path(__file__).with_name("glyphs.npz")) as kept:
-            self.places = {letter: number for number, letter in enumerate(str(kept["text"]))}
-            self.advances, self.starts = kept["advances"], kept["starts"]
-            self.pixels = kept["pixels"].astype(np.float32) / 255.0
-            self.size, self.height, self.base, self.pad = (int(value) for value in kept["metrics"])
+        kept = _arrays(Path(__file__).with_name("glyphs.npz"))
+        self.places = {letter: number for number, letter in enumerate(str(kept["text"]))}
+        self.advances, self.starts = kept["advances"], kept["starts"]
+        self.pixels = kept["pixels"].astype(np.float32) / 255.0
+        self.size, self.height, self.base, self.pad = (int(value) for value in kept["metrics"])
 
 
 @lru_cache(maxsize=1)

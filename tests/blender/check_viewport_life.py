@@ -187,8 +187,7 @@ def test_histogram_follows():
     stamp = histogram.of(obj).stamp
     obj.data.attributes["score"].data.foreach_set("value", numbers[::-1] * 0.5)
     obj.data.update()
-    yield lambda: histogram.of(obj).stamp > stamp and line() == 192
-    check(histogram.of(obj).counts[128:].sum() == 0, "numbers that changed")
+    yield lambda: histogram.of(obj).stamp > stamp and line() == 192 and histogram.of(obj).counts[128:].sum() == 0  # a sample may come first
 
 
 def test_what_changes_is_read():
@@ -599,6 +598,11 @@ def test_a_plan_is_one_undo_step():
         check(bpy.ops.render.patina_plan_sheet('INVOKE_DEFAULT') == {'RUNNING_MODAL'}, "no dialog")
     yield pause(0.5)
     whole_window("plan_dialog")
+    if bpy.app.use_event_simulate:
+        window = bpy.context.window_manager.windows[0]
+        for value in ('PRESS', 'RELEASE'):  # closes the dialog, which would lie over the views of the tests that follow
+            window.event_simulate('ESC', value, x=20, y=20)
+            yield pause(0.3)
     with override():
         size = scene.render.resolution_x
         scene.render.resolution_y = 777
