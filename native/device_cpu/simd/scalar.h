@@ -46,7 +46,8 @@ static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m)
     typedef uint32_t __attribute__((may_alias)) half;
     return m ? __atomic_load_n((const half *)(const void *)((const char *)keys + 8 * (size_t)i + 4), __ATOMIC_RELAXED) : 0;
 }
-static inline vi vi_load_z(const uint64_t *keys) { return (uint32_t)(*keys >> 32); }
+// Another thread may lower the key meanwhile, here too: raster reads before it writes.
+static inline vi vi_load_z(const uint64_t *keys) { return (uint32_t)(__atomic_load_n(keys, __ATOMIC_RELAXED) >> 32); }
 static inline vi vi_load_id(const uint64_t *keys) { return (uint32_t)*keys; }
 static inline uint32_t vm_bits(vm m) { return m; }
 static inline vm vm_first(uint32_t n) { return n > 0; }
