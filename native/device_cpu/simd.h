@@ -8,6 +8,12 @@
 #include "math.h"
 #include "tables.h"
 
+// base moved by some bytes; NULL is allowed, where no lane reads: C knows no sum of that.
+static inline const void *pt_moved(const void *base, intptr_t bytes)
+{
+    return (const void *)((uintptr_t)base + (uintptr_t)bytes);
+}
+
 #if defined(PT_ISA_AVX512)
 #include "simd/avx512.h"
 #elif defined(PT_ISA_AVX2)
@@ -51,7 +57,7 @@ typedef uint64_t vi_words __attribute__((vector_size(32), aligned(8), may_alias)
 
 static inline vi vi_gather_id(const uint64_t *keys, vi i, vm m) // lower words of keys
 {
-    return vi_gather_z((const uint64_t *)(const void *)((const char *)keys - 4), i, m);
+    return vi_gather_z(pt_moved(keys, -4), i, m);
 }
 static inline vf vf_gather(const float *base, vi i, vm m) { return vi_float(vi_gather(base, i, m)); }
 static inline vf vf_west(vf before, vf own) { return vi_float(vi_west(vf_bits(before), vf_bits(own))); }

@@ -136,12 +136,26 @@ static void test_lanes(void **state)
 #endif
 }
 
+// A kernel whose map has no pixels has no keys, either, and asks for none.
+static void test_no_lanes(void **state)
+{
+    (void)state;
+    const vi at = vi_lanes();
+    const vm none = vm_of_bits(0);
+    for (int k = 0; k < PT_LANES; k++) {
+        assert_int_equal(word_at(vi_gather(NULL, at, none), k), 0);
+        assert_int_equal(word_at(vi_gather_z(NULL, at, none), k), 0);
+        assert_int_equal(word_at(vi_gather_id(NULL, at, none), k), 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pairs_of_odd_numbers),
         cmocka_unit_test(test_conversions),
         cmocka_unit_test(test_lanes),
+        cmocka_unit_test(test_no_lanes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

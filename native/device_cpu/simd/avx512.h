@@ -40,7 +40,7 @@ static inline vi vi_gather(const void *base, vi i, vm m)
 }
 static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) // upper words of keys
 {
-    return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, (const char *)keys + 4, 8);
+    return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, pt_moved(keys, 4), 8);
 }
 static inline uint32_t vm_bits(vm m) { return m; }
 static inline vm vm_first(uint32_t n) { return (vm)((1u << n) - 1u); }

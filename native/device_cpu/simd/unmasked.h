@@ -15,7 +15,7 @@ static inline vi gather(const void *base, vi i, vm m, size_t scale)
     return vi_and(words, m);
 }
 static inline vi vi_gather(const void *base, vi i, vm m) { return gather(base, i, m, 4); }
-static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return gather((const char *)keys + 4, i, m, 8); }
+static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return gather(pt_moved(keys, 4), i, m, 8); }
 static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return gather(base, i, m, 1); }
 // One load for both.
 static inline void vi_gather_two_z(const uint64_t *keys, vi i, vm m, vi z[2])
