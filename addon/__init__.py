@@ -4,7 +4,7 @@
 bl_info = {  # for Blender 3.4 to 4.1; later ones read blender_manifest.toml
     "name": "Patina",
     "author": "The Patina authors",
-    "version": (0, 1, 0),
+    "version": (1, 0, 0),
     "blender": (3, 4, 0),
     "location": "Render Properties > Render Engine > Patina; File > Import > Point Cloud",
     "description": "Image-space rendering of point clouds",
@@ -14,15 +14,21 @@ bl_info = {  # for Blender 3.4 to 4.1; later ones read blender_manifest.toml
 import bpy
 from bpy.app.handlers import persistent
 
+try:
+    import numpy  # noqa: F401  Blenders of blender.org contain it
+except ImportError as error:
+    raise ImportError("Patina needs numpy, which this Blender's Python lacks. On Debian and Ubuntu, run 'sudo apt install python3-numpy' and "
+                      "restart Blender. Blenders from blender.org contain it.") from error
+
 from . import migrate, operators, preferences, properties, ui, versions
-from .draw import engine, histogram, missing, overlays, render, thinned, viewport
+from .draw import drawings, engine, histogram, measures, missing, overlays, render, thinned, viewport
 from .properties import answers
 from .sync.analyses import estimates
 from .sync.objects import images, meshes
-from .sync.points import attributes, built, files
+from .sync.points import attributes, built, files, node_colors
 from .sync.view import pairs
 
-_MODULES = (preferences, properties, files, migrate, pairs, overlays, missing, thinned, engine, operators, ui)
+_MODULES = (preferences, properties, files, migrate, pairs, overlays, missing, measures, drawings, thinned, engine, operators, ui)
 _UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 
 
@@ -34,6 +40,7 @@ def _forget(*_) -> None:
     built.CACHE.clear()
     meshes.CACHE.clear()
     images.CACHE.clear()
+    node_colors.forget()
 
 
 @persistent
@@ -64,4 +71,5 @@ def unregister() -> None:
     built.CACHE.clear()
     meshes.CACHE.clear()
     images.CACHE.clear()
+    node_colors.forget()
     render.forget_device()

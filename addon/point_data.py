@@ -134,6 +134,14 @@ def finished(data: bpy.types.ID, cloud: bool) -> bpy.types.ID:
     return data  # Blender refused: the points are there all the same
 
 
+def select_alone(context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """Selects an object of the view layer and nothing else, and makes it active."""
+    for other in context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
+
+
 def convert(objects: list[bpy.types.Object], kind: str) -> None:
     """Blender's own conversion of objects in the view layer, which are selected for it and nothing else. What was selected is again."""
     layer = bpy.context.view_layer

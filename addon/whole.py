@@ -118,7 +118,10 @@ class Folder:
         while True:
             self._folder = tempfile.TemporaryDirectory(prefix=prefix, dir=where, ignore_cleanup_errors=True)
             lock = Path(self._folder.name) / _LOCK
-            self._lock = open(lock, "wb")
+            try:
+                self._lock = open(lock, "wb")
+            except FileNotFoundError:
+                continue  # somebody took the empty folder for left over
             if _hold(self._lock, lock):
                 break
             self.cleanup()  # somebody took it for left over
@@ -152,5 +155,8 @@ def remove_left_folders(where: Path, prefix: str) -> int:
                     count += _remove_unheld(folder / _LOCK, folder)
                 elif time.time() - status.st_mtime > _OLD:
                     shutil.rmtree(folder)
+                    count += 1
+                else:
+                    folder.rmdir()  # its owner ended before it made the lock; one with files stays until it is old
                     count += 1
     return count

@@ -10,7 +10,7 @@ from typing import Any
 
 LIST = Path(__file__).resolve().parent.parent / "native/include/patina/effects.def"
 KINDS = {"NUMBER": 1, "COUNT": 1, "COLOR": 3, "AXIS": 3, "SWITCH": 1, "CHOICE": 1}
-PANELS = ("CUES", "DRAWING", "CAMERA")
+PANELS = ("CUES", "DRAWING", "IMAGE", "CAMERA")
 UNITS = ("NONE", "SHARE", "PIXELS", "LENGTH", "HEIGHT", "COLOR")
 
 
@@ -66,6 +66,11 @@ def read() -> list[dict[str, Any]]:
     return parse(LIST.read_text(encoding="utf-8"))
 
 
+def own() -> list[dict[str, Any]]:
+    """Effects with a panel and properties of their own: all but those that take the camera's."""
+    return [effect for effect in read() if effect["panel"] != "CAMERA"]
+
+
 def parse(text: str) -> list[dict[str, Any]]:
     """Effects as they are listed: name, label, panel, about, fields: name, kind, property, when, label, about, and by their kind
     least, zero, unit, start, low, usual, high; items (name, label, about); automatic (start, about).
@@ -89,7 +94,7 @@ def parse(text: str) -> list[dict[str, Any]]:
             fields[-1]["items"].append(tuple([values[0].split("_", 1)[1], *values[2:]]))
         elif kind == "_AUTOMATIC":
             next(field for field in fields if field["name"] == values[0])["automatic"] = tuple(values[1:])
-        elif kind != "_RULE":
+        elif kind not in ("_RULE", "_GRID"):
             raise ValueError(f"effects.def: PATINA_EFFECT{kind} is not known")
     for effect, (option, taken) in zip(effects, options):
         _check(effect, option, taken)

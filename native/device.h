@@ -166,14 +166,16 @@ struct pt_device_ops {
                struct pt_buffer *const *buffers, uint32_t buffer_count, const atomic_int *cancel);
     // Runs the tail of a plan, its last passes, as one, without the planes between its passes. NULL where a device gains
     // nothing by it. tail_length: how many of these passes it takes, 0 or from the first on; their buffers are not known yet.
-    // NULL: all there are.
+    // NULL: all there are. cancel: as in run.
     uint32_t (*tail_length)(const struct pt_bound_pass *passes, uint32_t count);
-    int (*run_tail)(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count);
+    int (*run_tail)(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count, const atomic_int *cancel);
     // All of these at one go: the device is waited for once. cancel, progress: NULL: nobody asks. Times are the device's own: of each
     // group in a frame that is measured; else only of those over points, and of all others between them. NULL where that is no faster
     // than run, run_tail and wait in turn.
     int (*run_groups)(struct patina_device *device, struct pt_group *groups, uint32_t count, const atomic_int *cancel,
                       _Atomic float *progress);
+    // The most bytes that a kernel can bind as this buffer of its list. NULL: any number.
+    uint64_t (*most)(const struct patina_device *device, const struct pt_buffer_row *row);
     // Waits for all work (so that a clock means something).
     int (*wait)(struct patina_device *device);
     // Until the next call kernels call look(context) from time to time, from any of their threads; look NULL: no longer.

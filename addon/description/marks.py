@@ -27,6 +27,15 @@ class Bar:
 
 
 @dataclass(frozen=True)
+class Strokes:
+    """Measurements: segments, points and values, in pixels of the image from its bottom left."""
+
+    segments: tuple[tuple[float, float, float, float], ...]  # both ends
+    dots: tuple[tuple[float, float], ...]  # measured points
+    labels: tuple[tuple[float, float, str], ...]
+
+
+@dataclass(frozen=True)
 class Marks:
     legends: tuple[Legend, ...] = ()
     bar: Bar | None = None
@@ -34,3 +43,4 @@ class Marks:
     titles: tuple[str, ...] = ()
     size: float = 1.0  # factor of the text's size
     burn: bool = False  # into the image
+    strokes: Strokes | None = None

@@ -90,6 +90,11 @@ class Soft:
     desc: Desc = ()
     placed: bool = True  # what a distance is measured to
 
+    @property
+    def hides(self) -> bool:
+        """Whether points above the threshold are hidden, not soft."""
+        return dict(self.style)["soft"] == native.abi.SOFT["HIDDEN"]
+
     def missing(self, cloud: native.Cloud) -> str:
         """What the cloud lacks for it, for the artist; "": nothing."""
         if cloud.stream and self.by != 'ALL':

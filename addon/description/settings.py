@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, make_dataclass, replace
 from typing import Any
 
-from ..native.abi import EFFECTS
+from ..native.abi import EFFECTS, OWN_EFFECTS
 from .view import Focus
 
 _FIELDS = [field for effect in EFFECTS for field in effect["fields"]]
@@ -93,8 +93,7 @@ class _Effects:
 
     def focus_alone(self) -> Effects:
         """All others off."""
-        return replace(self, **{name: value for effect in EFFECTS if effect["panel"] != "CAMERA"
-                                for name, value in off(effect).items()})
+        return replace(self, **{name: value for effect in OWN_EFFECTS for name, value in off(effect).items()})
 
 
 # patina_effects; what is switched off has no strength.

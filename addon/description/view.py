@@ -18,6 +18,8 @@ class Camera:
     top: float
     near_clip: float
     far_clip: float
+    panorama_face: int = 0  # 1: a face of a panorama
+    camera_unused: int = 0
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Color
 
 from ..description.marks import Marks
+from ..sync.view.camera import camera_frame
 from . import graphics, marks, overlays, painting, sky
 from .pictures import Shown
 
@@ -80,14 +81,13 @@ class Canvas:
             overlays.after(context.region, finish)
 
     def draw_marks(self, context: bpy.types.Context, shown: Marks | None) -> None:
-        """Draws legends, scale bar, north arrow and title where the view shows overlays: over the part that no header and
-        no sidebar covers. GraphicsError."""
+        """Draws legends, scale bar, north arrow and title where the view shows overlays. GraphicsError."""
         if shown is None or not context.space_data.overlay.show_overlays:
             self._marks = None
             return
         region = context.region
-        right, top = _free(context.area, region)
-        key = (shown, region.width - right, region.height - top)
+        x0, y0, x1, y1 = _marked(context)
+        key = (shown, x1 - x0, y1 - y0)
         if min(key[1:]) < 1:
             return
         if self._marks is None or self._marks[0] != key:
@@ -95,7 +95,8 @@ class Canvas:
         gpu.state.depth_test_set('NONE')
         gpu.state.blend_set('ALPHA_PREMULT')
         try:
-            painting.fill_rectangle([-1.0, -1.0, 2.0 * key[1] / region.width - 1.0, 2.0 * key[2] / region.height - 1.0], 'EXACT', self._marks[1])
+            corners = [2.0 * place / size - 1.0 for place, size in zip((x0, y0, x1, y1), (region.width, region.height) * 2, strict=True)]
+            painting.fill_rectangle(corners, 'EXACT', self._marks[1])
         finally:
             gpu.state.blend_set('NONE')
 
@@ -150,6 +151,19 @@ class Canvas:
         shader.uniform_float("projection", (*projection, packed if orthographic else -packed))
         self._chosen_batch.draw(shader)
         gpu.state.program_point_size_set(False)
+
+
+def _marked(context: bpy.types.Context) -> tuple[int, int, int, int]:
+    """x0, y0, x1, y1 of the region's pixels that marks are drawn in: those that no header and no sidebar covers, and of a view through a
+    camera those within its frame, where a render has them."""
+    region, space, view = context.region, context.space_data, context.region_data
+    right, top = _free(context.area, region)
+    x0, y0, x1, y1 = 0, 0, region.width - right, region.height - top
+    camera = space.camera or context.scene.camera
+    if view.view_perspective == 'CAMERA' and camera is not None and camera.type == 'CAMERA':
+        left, bottom, end, upper = map(round, camera_frame(region, view, camera, context.scene))
+        x0, y0, x1, y1 = max(x0, left), max(y0, bottom), min(x1, end), min(y1, upper)
+    return x0, y0, x1, y1
 
 
 def _free(area: bpy.types.Area, region: bpy.types.Region) -> tuple[int, int]:

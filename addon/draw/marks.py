@@ -13,11 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..description.marks import Legend, Marks
+from ..description.marks import Legend, Marks, Strokes
 
 TEXT = 1.0 / 38.0  # of the image's shorter side: the height of text
 LEAST = 11.0  # pixels: text is never smaller
 _INK, _PAPER = (0.95, 0.95, 0.95), (0.012, 0.012, 0.012)
+_LINE = (1.0, 0.57, 0.022)  # of measurements, as in the viewport
 _VEIL = 0.62  # opacity of the panel behind text
 
 
@@ -93,6 +94,19 @@ class _Sheet:
         cover = line(text, self.size)
         self.blend(round(x - self.size * 0.1), round(middle - 0.5 * cover.shape[0]), cover, _INK)
 
+    def segment(self, x0: float, y0: float, x1: float, y1: float, width: float, color: tuple[float, ...], opacity: float = 1.0) -> None:
+        """A line with round ends, from pixel to pixel."""
+        reach = 0.5 * width + 1.0
+        left, right = (int(np.clip(side, 0, self.width)) for side in (min(x0, x1) - reach, max(x0, x1) + reach + 1.0))
+        low, high = (int(np.clip(side, 0, self.height)) for side in (min(y0, y1) - reach, max(y0, y1) + reach + 1.0))
+        if left >= right or low >= high:
+            return
+        x, y = np.meshgrid(np.arange(left, right, dtype=np.float32) + 0.5 - x0, np.arange(low, high, dtype=np.float32) + 0.5 - y0)
+        way = np.array((x1 - x0, y1 - y0))
+        share = np.clip((x * way[0] + y * way[1]) / max(float(way @ way), 1e-12), 0.0, 1.0)
+        cover = np.clip(0.5 * width + 0.5 - np.hypot(x - share * way[0], y - share * way[1]), 0.0, 1.0)
+        self.blend(left, low, (opacity * cover).astype(np.float32), color)
+
     def wide(self, texts: list[str]) -> float:
         return max((line(text, self.size).shape[1] for text in texts), default=0) - 0.2 * self.size
 
@@ -102,6 +116,8 @@ def paint(marks: Marks, width: int, height: int, full: int = 0) -> np.ndarray:
     pixels; 0: it is no part."""
     size = max(min(width, height) * TEXT, LEAST) * marks.size
     sheet = _Sheet(width, height, size)
+    if marks.strokes:
+        _strokes(sheet, marks.strokes)
     margin, top = size, height - size
     for legend in marks.legends:
         top = _legend(sheet, legend, width - margin, top) - 0.6 * size
@@ -118,6 +134,21 @@ def over(marks: Marks, pixels: np.ndarray, full: int = 0) -> np.ndarray:
     """The image with the marks burned in; a new array. full: as in paint()."""
     ink = paint(marks, pixels.shape[1], pixels.shape[0], full)
     return ink + pixels * (1.0 - ink[..., 3:])
+
+
+def _strokes(sheet: _Sheet, strokes: Strokes) -> None:
+    """Measurements: lines and points with a dark border, and values above and to the right of their places."""
+    size = sheet.size
+    thin = max(size / 8.0, 1.5)
+    for width, color, opacity in ((2.2 * thin, _PAPER, 0.75), (thin, _LINE, 1.0)):
+        for segment in strokes.segments:
+            sheet.segment(*segment, width, color, opacity)
+    for x, y in strokes.dots:
+        sheet.segment(x, y, x, y, 4.2 * thin, _PAPER, 0.75)
+        sheet.segment(x, y, x, y, 3.0 * thin, _LINE)
+    for x, y, text in strokes.labels:
+        sheet.box(x + 0.4 * size, y + 0.4 * size, sheet.wide([text]) + 0.6 * size, 1.5 * size, _PAPER, _VEIL)
+        sheet.write(x + 0.7 * size, y + 1.15 * size, text)
 
 
 def _legend(sheet: _Sheet, legend: Legend, right: float, top: float) -> float:

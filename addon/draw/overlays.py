@@ -24,6 +24,7 @@ from .. import native
 from ..description.scene import SceneDescription
 from ..sync.points import attributes
 from . import cryptomatte
+from .over_views import OverViews
 
 KEEPS_DEPTH = bpy.app.version < (4, 4, 0)  # whether overlays test against the depth that an engine writes
 FAR = 1e30  # of a depth: nothing is there
@@ -34,7 +35,6 @@ CURSOR = (4.0, 10.0, 20.0)  # pixels: where the lines of the 3D cursor begin, th
 
 Color = tuple[float, float, float, float]
 _waiting: dict[int, Callable[[], None]] = {}  # by region: work for the end of its drawing
-_handler: object | None = None
 
 
 def after(region: bpy.types.Region, work: Callable[[], None]) -> None:
@@ -166,15 +166,10 @@ def without_own(frame: native.Frame, description: SceneDescription, depth: np.nd
     return np.where(np.array([*own, False])[shown][..., None], np.float32(FAR), depth)
 
 
-def register() -> None:
-    global _handler
-    if not bpy.app.background:
-        _handler = bpy.types.SpaceView3D.draw_handler_add(_after_view, (), 'WINDOW', 'POST_VIEW')
+_over = OverViews(_after_view, 'POST_VIEW')
+register = _over.register
 
 
 def unregister() -> None:
-    global _handler
-    if _handler:
-        bpy.types.SpaceView3D.draw_handler_remove(_handler, 'WINDOW')
-    _handler = None
+    _over.unregister()
     _waiting.clear()

@@ -49,6 +49,7 @@ class Canvas:
         self._panorama = native.Panorama(**asdict(description.panorama)) if description.panorama else None
         views = list(self._faces(description)) if self._panorama else [description]
         self._regions = [view.settings.region for view in views]
+        self._joined = [description.panorama.region] if description.panorama else []
         self._planes: list[Planes] = [{} for _ in views]
         self.pieces: list[Piece] = []
         for face, view in enumerate(views):
@@ -76,6 +77,11 @@ class Canvas:
             if whole is None:
                 whole = self._planes[piece.face][name] = np.empty((y1 - y0, x1 - x0, pixels.shape[2]), pixels.dtype)
             whole[low - y0:high - y0, left - x0:right - x0] = pixels
+
+    def bytes(self, wanted: Iterable[str]) -> int:
+        """What these planes of all pieces take, and those that faces are joined to."""
+        pixels = sum((x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in (*self._regions, *self._joined))
+        return pixels * sum(8 if name in ("KEYS", "NUMBERS") else 4 * native.PLANES[native.split_plane(name)[0]][1] for name in wanted)
 
     def planes(self, wanted: Iterable[str]) -> Planes:
         """The whole picture. Where it is not joined out of faces the arrays are those that put() writes into."""

@@ -21,7 +21,7 @@ from ..sync.lighting.lights import of_headlight
 from ..sync.points import edits, ranges, soft
 from ..sync.points.colors import OWN, SCALAR
 from . import backdrop, cryptomatte, histogram, mattes
-from .pieces import LARGE_PICTURE, PIXEL_BYTES, Canvas, Piece, Planes, tiles
+from .pieces import LARGE_PICTURE, LEAST_TILE, PIXEL_BYTES, Canvas, Piece, Planes, tiles
 
 # Pictures of several samples: milliseconds of them between two looks at whether somebody wants to see the picture; seconds between
 # two that are shown, and how many times as long they last at least as showing one took.
@@ -108,19 +108,34 @@ def _draw_seen(description: SceneDescription, planes: Iterable[str], poll: Calla
             color = backdrop.over(color, behind)
         return found[0] | {"COMBINED": color}
 
-    budget = memory.for_planes() or LARGE_PICTURE * PIXEL_BYTES
-    whole = len(tiles(description.settings.region, tile_size, budget // len(parts))) == 1
-    if whole and not description.panorama and description.settings.pixel_samples != 1:
-        return _on_device(description.device, poll, lambda device: _draw_samples(device, parts, finish, poll, show))
+    def within(device: native.Device, size: int, budget: int) -> Picture:
+        whole = len(tiles(description.settings.region, size, budget)) == 1
+        if whole and not description.panorama and description.settings.pixel_samples != 1:
+            return _draw_samples(device, parts, finish, poll, show)
+        return _draw_pieces(device, [(Canvas(item, size, budget), names) for item, names in parts], finish, poll, show)
 
-    def on_device(device: native.Device) -> Picture:
-        return _draw_pieces(device, [(Canvas(item, tile_size, budget // len(parts)), names) for item, names in parts], finish, poll, show)
+    budget = (memory.for_planes() or LARGE_PICTURE * PIXEL_BYTES) // len(parts)
+    return _on_device(description.device, poll, lambda device: _as_it_fits(device, tile_size, budget, within))
 
-    return _on_device(description.device, poll, on_device)
+
+def _as_it_fits(device: native.Device, size: int, budget: int, within: Callable[[native.Device, int, int], Picture]) -> Picture:
+    """Draws in tiles of this size (0: as the budget of bytes has them). Where the device refuses these as too large, in smaller ones: of half
+    the budget each time."""
+    while True:
+        try:
+            return within(device, size, budget)
+        except MemoryError:  # numpy's: tiles fit, what they are joined to does not
+            raise native.PatinaError("out of memory for the whole image: render a smaller one, or a border of it", native.MEMORY) from None
+        except native.PatinaError as error:
+            if error.code != native.TOO_LARGE or budget < LEAST_TILE ** 2 * PIXEL_BYTES:
+                raise
+        budget = min(budget, LARGE_PICTURE * PIXEL_BYTES, size * size * PIXEL_BYTES or budget) // 2
+        size = 0
 
 
 def _on_device(choice: DeviceChoice, poll: Callable[[float], bool], draw_on: Callable[[native.Device], Picture]) -> Picture:
-    """Where the GPU fails in the middle of it (lost context, memory, a broken driver) the CPU draws the picture."""
+    """Where the GPU fails in the middle of it (lost context, memory, a broken driver), or draws not even
+    small tiles, the CPU draws the picture."""
     device = _open(choice, poll)
     try:
         return draw_on(device)
@@ -345,10 +360,19 @@ class _Pieces:
         stats["ms"] = ms
 
 
+def _check_memory(parts: list[tuple[Canvas, list[str]]]) -> None:
+    """Raises PatinaError where the finished planes are larger than the memory that is free."""
+    needed, free = sum(canvas.bytes(wanted) for canvas, wanted in parts), memory.free()
+    if free is not None and needed > free:
+        what = "panorama, with its six faces," if parts[0][0].pieces[-1].face else "whole image"
+        raise native.PatinaError(f"the {what} needs {needed >> 20} MB of memory, and {free >> 20} MB are free: render a smaller one", native.MEMORY)
+
+
 def _draw_pieces(device: native.Device, parts: list[tuple[Canvas, list[str]]], finish: Callable[[list[Planes]], Planes],
                  poll: Callable[[float], bool], show: Show | None) -> Picture:
     """Tiles, and faces of panoramas. Of several samples, where somebody looks, first one of each piece and then, piece by piece, the
     others; cancelled then, it keeps what it has."""
+    _check_memory(parts)
     first = parts[0][0].pieces[0].description
     samples, news, notice, cut_off = first.settings.pixel_samples, _News(show), "", False
     with ExitStack() as stack:  # frames are made and closed on this thread, so that poll never meets a dead handle

@@ -4,7 +4,8 @@
 Blender draws vertices without faces as black dots or not at all, and PointClouds gray in Solid shading, whatever its Color option says
 (3.4 to 5.2). Material Preview shows a PointCloud with its material, so nothing is added there. Each cloud gives up to as many points as
 the preferences allow: as discs that fill the spacing, drawn after the overlays, hidden by what Blender has drawn nearer. Nothing of the
-scene changes. Objects in Edit Mode and linked files are left to Blender.
+scene changes. Objects in Edit Mode are left to Blender. Of linked files Blender holds a box: their points come from the saved cloud, or
+from the coarsest levels of a file that is read as needed. Hidden and deleted points are left out.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from bpy.app.handlers import persistent
 from gpu_extras.batch import batch_for_shader
 
 from .. import choices, point_data
-from ..sync.points import attributes
+from ..sync.analyses import scans_of
+from ..sync.points import attributes, edits
 from ..sync.view import clips
-from . import graphics
+from . import graphics, thinned_files
 
 SHADINGS = {'WIREFRAME', 'SOLID', 'MATERIAL'}
 NEARER = 1.5  # radii: before Blender's own spheres and dots of the same points
@@ -51,7 +53,7 @@ class _Drawn:
     cloud: bool  # a PointCloud that Blender shows and its material colors
 
 
-_parts: dict[tuple[int, str, int], _Part | None] = {}  # by the object's place in memory, the attribute that colors it and the budget
+_parts: dict[tuple[int, tuple, int], _Part | None] = {}  # by the object's place in memory, what is shown of it and the budget
 _drawn: dict[tuple[int, int], list[_Drawn]] = {}  # by the view layer's place in memory and the budget; empty after a change
 
 
@@ -60,6 +62,7 @@ def forget(*_: object) -> None:
     """After undo, or another file."""
     _parts.clear()
     _drawn.clear()
+    thinned_files.forget()
 
 
 # ---- what is shown ---------------------------------------------------------------------------------------------------
@@ -79,14 +82,45 @@ def thin(obj: bpy.types.Object, budget: int) -> _Part | None:
     places = attributes.positions(obj.data, count) if count else None
     if places is None:
         return None
-    index = chosen(count, budget)
+    shown = _shown(obj, count)
+    index = chosen(count, budget) if shown is None else shown[chosen(len(shown), budget)]
     index = index[np.isfinite(places[index]).all(axis=1)]
     if not len(index):
         return None
     few = places[index]
-    radii = np.float32(FILL) * point_data.local_spacing(few)
+    return _Part(_sized(few), _colors(obj, count, index, few))
+
+
+def _shown(obj: bpy.types.Object, count: int) -> np.ndarray | None:
+    """Indices of the points of an evaluated object whose scans are not hidden; None: all."""
+    state = edits.state_of(obj)
+    if not state.hidden:
+        return None
+    columns = {name: attributes.scalars(obj.data, count, name) for name in scans_of.SCAN_NAMES}
+    known, scans = scans_of.scans_in({name: values[:, 0] for name, values in columns.items() if values is not None})
+    gone = edits.gone_of(state, count, known.numbers if known else (), scans)
+    return None if gone is None else np.flatnonzero(~edits.flags(gone, count))
+
+
+def _sized(places: np.ndarray) -> np.ndarray:
+    """(n, 4) float32: x, y, z, radius."""
+    radii = np.float32(FILL) * point_data.local_spacing(places)
     radii = np.minimum(radii, np.float32(WIDEST) * np.median(radii))
-    return _Part(np.concatenate([few, radii.reshape(-1, 1)], 1), _colors(obj, count, index, few))
+    return np.concatenate([places, radii.reshape(-1, 1)], 1)
+
+
+def _of_file(points: thinned_files.Points) -> _Part | None:
+    places, colors, normals, scalars = points
+    finite = np.isfinite(places).all(axis=1) if len(places) else np.zeros(0, bool)
+    if not finite.any():
+        return None
+    places, colors, normals, scalars = (values[finite] for values in (places, colors, normals, scalars))
+    out = np.ones((len(places), 4), np.float32)
+    if np.isfinite(colors).any():
+        out[:, :3] = np.clip(np.nan_to_num(colors), 0.0, 1.0)
+    else:
+        out[:, :3] = _grays(places, scalars if np.isfinite(scalars).any() else None, normals if np.isfinite(normals).any() else None)
+    return _Part(_sized(places), out)
 
 
 def _colors(obj: bpy.types.Object, count: int, index: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -102,14 +136,19 @@ def _colors(obj: bpy.types.Object, count: int, index: np.ndarray, places: np.nda
         return out
     found = attributes.scalars(obj.data, count, attributes.intensity_name(obj.data))
     normals = attributes.normals(obj.data, count, "") if found is None else None
-    if found is not None:
-        gray = _stretched(found[index, 0])
+    out[:, :3] = _grays(places, None if found is None else found[index, 0], None if normals is None else normals[index])
+    return out
+
+
+def _grays(places: np.ndarray, intensities: np.ndarray | None, normals: np.ndarray | None) -> np.ndarray:
+    """(n, 1) float32, linear."""
+    if intensities is not None:
+        gray = _stretched(intensities)
     elif normals is not None:
-        gray = np.abs(np.nan_to_num(normals[index]) @ LIGHT)
+        gray = np.abs(np.nan_to_num(normals) @ LIGHT)
     else:
         gray = _stretched(places[:, 2])
-    out[:, :3] = (0.05 + 0.6 * np.clip(gray, 0.0, 1.0)).reshape(-1, 1)
-    return out
+    return (0.05 + 0.6 * np.clip(gray, 0.0, 1.0)).reshape(-1, 1).astype(np.float32)
 
 
 def _stretched(values: np.ndarray) -> np.ndarray:
@@ -125,17 +164,50 @@ def _look_up(depsgraph: bpy.types.Depsgraph, budget: int) -> list[_Drawn]:
     found = []
     for instance in depsgraph.object_instances:
         obj = instance.object
-        if not instance.show_self or not point_data.holds_points(obj) or clips.cuts(obj) or obj.mode == 'EDIT':
+        if not instance.show_self or not point_data.is_cloud(obj) or clips.cuts(obj) or obj.mode == 'EDIT':
             continue
-        key = (obj.original.as_pointer(), obj.patina.color_attribute, budget)
-        if key not in _parts:
-            _parts[key] = thin(obj, budget)
-        if _parts[key] is None:
+        part = _part_of_link(obj, depsgraph.scene.frame_current, budget) if obj.patina.linked_file else _part_of(obj, budget)
+        if part is None:
             continue
         owner = instance.parent if instance.is_instance else obj
         cloud = obj.type == 'POINTCLOUD' and point_data.shows_spheres(obj) and any(slot.material for slot in obj.material_slots)
-        found.append(_Drawn(_parts[key], owner.original.as_pointer(), instance.matrix_world.copy(), cloud))
+        found.append(_Drawn(part, owner.original.as_pointer(), instance.matrix_world.copy(), cloud))
     return found
+
+
+def _part_of(obj: bpy.types.Object, budget: int) -> _Part | None:
+    key = (obj.original.as_pointer(), (obj.patina.color_attribute, edits.state_of(obj).hidden), budget)
+    if key not in _parts:
+        for other in [other for other in _parts if other[0] == key[0] and other[2] == budget]:
+            del _parts[other]
+        _parts[key] = thin(obj, budget)
+    return _parts[key]
+
+
+def _part_of_link(obj: bpy.types.Object, frame: int, budget: int) -> _Part | None:
+    """The points of the saved cloud. While they are read, those that were shown before."""
+    pointer, place = obj.original.as_pointer(), thinned_files.place_of(obj, frame)
+    if place is None:
+        return None
+    key = (pointer, place.key, budget)
+    if key in _parts:
+        return _parts[key]
+    points = thinned_files.obtain(place, budget, _arrived)
+    before = [other for other in _parts if other[0] == pointer]
+    if points is None:
+        return _parts[before[-1]] if before else None
+    for other in before:
+        del _parts[other]
+    _parts[key] = _of_file(points)
+    return _parts[key]
+
+
+def _arrived() -> None:
+    _drawn.clear()
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                area.tag_redraw()
 
 
 # ---- drawing ---------------------------------------------------------------------------------------------------------

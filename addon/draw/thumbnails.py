@@ -54,6 +54,8 @@ def of_sample(depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object) -> np.ndarr
                          classes=None if doubted else sample.classes(SAMPLE_POINTS).reshape(-1, 1))
     if doubted:
         cloud.analyse()
+    elif softened and softened.by == 'ATTRIBUTE':  # its height above the floor
+        cloud.numbers = np.ascontiguousarray(sample.points(SAMPLE_POINTS)[0][:, 2])
     return _draw(sync.describe_items(depsgraph, view, [], [CloudItem(cloud, style, 0, soft=softened)]))
 
 

@@ -24,6 +24,7 @@ from .loader import (
     INTERNAL,
     MEMORY,
     NEIGHBOURHOODS,
+    TOO_LARGE,
     TOO_MANY_POINTS,
     PatinaCancelled,
     PatinaError,
@@ -35,5 +36,5 @@ from .loader import (
 )
 
 __all__ = ["CANCELLED", "abi", "FILE", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File", "FileScan",
-           "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "TOO_MANY_POINTS", "Task", "Texture", "WRAPS",
+           "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "TOO_LARGE", "TOO_MANY_POINTS", "Task", "Texture", "WRAPS",
            "forget_library", "library", "library_path", "log_lines", "losses", "nearest_depths", "points", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]

@@ -8,7 +8,7 @@ from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_i
                     sizeof)
 from typing import Any
 
-VERSION = (0, 1)  # of the header; the patch number may differ
+VERSION = (1, 0)  # of the header; the patch number may differ
 
 SIDES_VOTED = 2
 TRUST_FEATURES = 33
@@ -22,13 +22,14 @@ PASSES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1
           "TRUST": (6, 1), "THICKNESS": (7, 1), "DENSITY": (8, 1), "DISAGREEMENT": (9, 1)}
 
 ERROR = {"OK": 0, "ERROR_ARGUMENT": -1, "ERROR_MEMORY": -2, "ERROR_FILE": -3, "ERROR_FORMAT": -4, "ERROR_UNSUPPORTED": -5,
-         "ERROR_DEVICE": -6, "ERROR_CANCELLED": -7, "ERROR_TOO_MANY_POINTS": -8, "ERROR_EMPTY": -9, "ERROR_INTERNAL": -10}
+         "ERROR_DEVICE": -6, "ERROR_CANCELLED": -7, "ERROR_TOO_MANY_POINTS": -8, "ERROR_EMPTY": -9, "ERROR_INTERNAL": -10,
+         "ERROR_TOO_LARGE": -11}
 TYPE = {"NONE": 0, "FLOAT32": 1, "FLOAT64": 2, "UINT8": 3, "UINT16": 4, "UINT32": 5, "INT8": 6, "INT16": 7, "INT32": 8}
 KIND = {"UNKNOWN": 0, "SURFACE": 1, "BORDER": 2, "LINE": 3, "VOLUME": 4, "STRAY": 5}
 LIGHTING = {"AUTO": 0, "UNLIT": 1, "LIT": 2}
 COLOR_SOURCE = {"OWN": 0, "FIXED": 1, "SCALAR": 2, "HEIGHT": 3, "OBJECT_HEIGHT": 4, "DISTANCE": 5, "TRUST": 6}
 FREE_SPACE = {"OFF": 0, "SHOW": 1, "USE": 2}
-SOFT = {"OFF": 0, "ALL": 1, "FIELD": 2}
+SOFT = {"OFF": 0, "ALL": 1, "FIELD": 2, "HIDDEN": 3}
 SOFT_MODEL = {"BASE": 0, "CONCENTRIC": 1, "EXPRESS": 2, "SPLATS": 3, "ONE_LAYER": 4}
 SHADOW_OFF = {"NO_CAST": 1, "NO_RECEIVE": 2, "NO_SELF": 4}
 CLIP_SHAPE = {"BOX": 0, "PLANE": 1}
@@ -43,6 +44,8 @@ ANTIALIAS = {"LAYERS": 0, "BACKGROUND": 1, "OFF": 2}
 EFFECT_CHOICE = {"NO_CHOICE": 0, "CONTOUR_HEIGHT": 0, "CONTOUR_PLANE": 1, "CONTOUR_ATTRIBUTE": 2}
 LINE_SOURCE = {"FIXED": 0, "POINT": 1, "DEPTH": 2}
 LINE_SURFACE = {"SHOWN": 0, "PAPER": 1, "NONE": 2}
+DRAWING_LAYER = {"CUT": 0, "CUT_BRIDGED": 1, "OUTLINE": 2, "CREASE": 3, "CONTOUR": 4, "CONTOUR_INDEX": 5, "PROFILE": 6,
+                 "FRAME": 7, "TEXT": 8}
 WRAP = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2}
 ALPHA = {"NONE": 0, "CLIP": 1, "BLEND": 2}
 KEYS_KIND = {"PART": 1, "NEXT": 2}
@@ -138,7 +141,7 @@ class LightDesc(Descriptor):
 class Camera(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("orthographic", c_uint32), ("world_from_camera", c_double * 16),
                 ("left", c_double), ("right", c_double), ("bottom", c_double), ("top", c_double), ("near_clip", c_double),
-                ("far_clip", c_double)]
+                ("far_clip", c_double), ("panorama_face", c_uint32), ("camera_unused", c_uint32)]
 
 
 class Settings(Descriptor):
@@ -199,6 +202,38 @@ class SaveDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("pack", c_uint32), ("drop_order", c_uint32)]
 
 
+class DrawingDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("origin", c_double * 3), ("right", c_double * 3), ("up", c_double * 3),
+                ("extent", c_double * 2), ("front", c_double), ("back", c_double), ("scale", c_double), ("epsg", c_uint32),
+                ("unused", c_uint32)]
+
+
+class CutDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("thickness", c_double), ("threads", c_uint32), ("unused", c_uint32),
+                ("places", c_void_p), ("shown", POINTER(c_void_p))]
+
+
+class ContourDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("interval", c_double), ("cell", c_double), ("index", c_uint32),
+                ("threads", c_uint32)]
+
+
+class OutlineDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("depth", c_void_p), ("width", c_uint32), ("height", c_uint32),
+                ("pixel", c_double), ("spacing", c_double), ("measured", c_void_p)]
+
+
+class DrawingInfo(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("lines", c_uint32), ("layer_lines", c_uint32 * 9),
+                ("layer_lengths", c_double * 9), ("samples", c_uint64), ("untrusted", c_uint64), ("spacing", c_double),
+                ("sigma", c_double), ("thickness", c_double)]
+
+
+class DrawingLine(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("layer", c_uint32), ("closed", c_uint32), ("vertices", c_uint32),
+                ("unused", c_uint32)]
+
+
 class FileInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32), ("origin", c_double * 3),
@@ -223,6 +258,18 @@ class GridDesc(Descriptor):
 
 class RowsInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("whole", c_char * 80)]
+
+
+class DistanceDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("other_count", c_uint64), ("position", Array),
+                ("normal", Array), ("other", Array), ("origin", c_double * 3), ("other_origin", c_double * 3),
+                ("normal_scale", c_double), ("cylinder", c_double), ("depth", c_double), ("registration_error", c_double),
+                ("threads", c_uint32), ("unused", c_uint32)]
+
+
+class GroundDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", Array), ("cell", c_double),
+                ("threshold", c_double), ("largest", c_double), ("threads", c_uint32), ("unused", c_uint32)]
 
 
 class MeshDesc(Descriptor):
@@ -300,6 +347,11 @@ class Pick(Descriptor):
                 ("classes", c_uint32 * 8), ("threads", c_uint32)]
 
 
+class Picked(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("found", c_uint32), ("number", c_uint64), ("position", c_double * 3),
+                ("distance", c_double)]
+
+
 class Read(Structure):
     _fields_ = [("pass_", c_uint32), ("pixels", c_void_p), ("size", c_size_t)]
 
@@ -307,6 +359,7 @@ class Read(Structure):
 # name → types of arguments; what returns anything but int stands in RESULTS
 CALLS = {
     "patina_version": (),
+    "patina_struct_size": (c_char_p,),
     "patina_error_text": (c_int,),
     "patina_message": (c_void_p, c_char_p, c_size_t),
     "patina_log_next": (c_char_p, c_size_t, c_void_p),
@@ -323,6 +376,7 @@ CALLS = {
     "patina_cloud_set_scalars": (c_void_p, POINTER(Array)),
     "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
     "patina_cloud_dense_box": (c_void_p, c_void_p, c_void_p),
+    "patina_cloud_thin": (c_void_p, c_void_p, c_size_t, c_uint64, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p),
     "patina_cloud_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p),
     "patina_cloud_neighbourhoods": (c_void_p, POINTER(Neighbourhoods), c_void_p),
     "patina_cloud_save": (c_void_p, c_char_p),
@@ -342,10 +396,12 @@ CALLS = {
     "patina_scene_set_effects": (c_void_p, POINTER(Effects)),
     "patina_scene_set_lines": (c_void_p, POINTER(Lines)),
     "patina_scene_extent": (c_void_p, c_void_p, c_void_p),
+    "patina_scene_ramp_range": (c_void_p, c_uint32, c_void_p),
     "patina_scene_frame_camera": (c_void_p, c_double, c_double, c_double, POINTER(Camera)),
     "patina_frame_create": (c_void_p, POINTER(c_void_p)),
     "patina_frame_destroy": (c_void_p,),
     "patina_frame_render": (c_void_p, c_void_p),
+    "patina_frame_check": (c_void_p, c_void_p),
     "patina_frame_refine": (c_void_p, c_void_p, c_double),
     "patina_frame_cancel": (c_void_p,),
     "patina_frame_progress": (c_void_p,),
@@ -353,16 +409,7 @@ CALLS = {
     "patina_frame_read_layer": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_nearest_depths": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_frame_read_keys": (c_void_p, c_void_p, c_size_t),
-    "patina_frame_bake_shadows": (c_void_p, c_void_p),
-    "patina_frame_read_shadows": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
-    "patina_frame_save_shadows": (c_void_p, c_char_p),
-    "patina_frame_load_shadows": (c_void_p, c_void_p, c_char_p),
     "patina_frame_get_stats": (c_void_p, POINTER(FrameStats)),
-    "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
-    "patina_frame_plan_text": (c_void_p, c_void_p, c_char_p, c_size_t),
-    "patina_frame_keep_planes": (c_void_p, c_uint32),
-    "patina_frame_measure": (c_void_p, c_uint32),
-    "patina_frame_dump_planes": (c_void_p, c_char_p),
     "patina_builder_begin": (c_char_p, POINTER(BuilderDesc), POINTER(c_void_p)),
     "patina_builder_add": (c_void_p, POINTER(CloudDesc)),
     "patina_builder_add_file": (c_void_p, c_void_p, c_char_p),
@@ -370,6 +417,21 @@ CALLS = {
     "patina_builder_destroy": (c_void_p,),
     "patina_cloud_analyse_file": (c_char_p, POINTER(AnalysisDesc), c_uint64, c_char_p, c_void_p),
     "patina_cloud_save_as": (c_void_p, c_char_p, POINTER(SaveDesc)),
+    "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
+    "patina_frame_plan_text": (c_void_p, c_void_p, c_char_p, c_size_t),
+    "patina_frame_keep_planes": (c_void_p, c_uint32),
+    "patina_frame_measure": (c_void_p, c_uint32),
+    "patina_frame_dump_planes": (c_void_p, c_char_p),
+    "patina_drawing_create": (POINTER(DrawingDesc), POINTER(c_void_p)),
+    "patina_drawing_destroy": (c_void_p,),
+    "patina_drawing_cut": (c_void_p, POINTER(c_void_p), c_uint32, POINTER(CutDesc), c_void_p),
+    "patina_drawing_contour": (c_void_p, POINTER(c_void_p), c_uint32, POINTER(ContourDesc), c_void_p),
+    "patina_drawing_outline": (c_void_p, POINTER(OutlineDesc)),
+    "patina_drawing_get_info": (c_void_p, POINTER(DrawingInfo)),
+    "patina_drawing_get_line": (c_void_p, c_uint32, POINTER(DrawingLine)),
+    "patina_drawing_read_line": (c_void_p, c_uint32, c_void_p, c_size_t),
+    "patina_drawing_read_depths": (c_void_p, c_uint32, c_void_p, c_size_t),
+    "patina_drawing_write": (c_void_p, c_char_p, c_uint32),
     "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
     "patina_file_destroy": (c_void_p,),
@@ -390,6 +452,12 @@ CALLS = {
     "patina_file_cloud": (c_void_p, c_uint32, c_void_p, POINTER(c_void_p)),
     "patina_cloud_load": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_write_ply": (c_char_p, POINTER(CloudDesc)),
+    "patina_distance_defaults": (POINTER(DistanceDesc),),
+    "patina_cloud_distance": (POINTER(DistanceDesc), c_void_p, c_void_p, c_void_p),
+    "patina_task_cloud_distance": (POINTER(DistanceDesc), c_void_p, c_void_p, c_void_p, POINTER(c_void_p)),
+    "patina_ground_defaults": (POINTER(GroundDesc),),
+    "patina_ground": (POINTER(GroundDesc), c_void_p, c_void_p, c_void_p),
+    "patina_task_ground": (POINTER(GroundDesc), c_void_p, c_void_p, c_void_p, POINTER(c_void_p)),
     "patina_mesh_create": (POINTER(MeshDesc), POINTER(c_void_p)),
     "patina_mesh_destroy": (c_void_p,),
     "patina_mesh_get_info": (c_void_p, POINTER(MeshInfo)),
@@ -422,7 +490,12 @@ CALLS = {
     "patina_field_get_info": (c_void_p, POINTER(FieldInfo)),
     "patina_frame_read_numbers": (c_void_p, c_void_p, c_size_t),
     "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
+    "patina_scene_pick_nearest": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, POINTER(Picked)),
     "patina_frame_highlight": (c_void_p, c_void_p, c_void_p, c_float, c_void_p, c_size_t),
+    "patina_frame_bake_shadows": (c_void_p, c_void_p),
+    "patina_frame_read_shadows": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
+    "patina_frame_save_shadows": (c_void_p, c_char_p),
+    "patina_frame_load_shadows": (c_void_p, c_void_p, c_char_p),
     "patina_task_render": (c_void_p, c_void_p, POINTER(Read), c_uint32, POINTER(c_void_p)),
     "patina_task_refine": (c_void_p, c_void_p, c_double, POINTER(Read), c_uint32, POINTER(c_void_p)),
     "patina_task_build": (POINTER(CloudDesc), c_void_p, POINTER(c_void_p)),
@@ -437,21 +510,23 @@ CALLS = {
     "patina_task_end_build": (c_void_p, c_void_p, POINTER(c_void_p)),
     "patina_task_analyse_file": (c_char_p, POINTER(AnalysisDesc), c_uint64, c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_task_verify": (c_char_p, c_void_p, POINTER(c_void_p)),
+    "patina_task_thin": (c_char_p, c_void_p, c_void_p, c_size_t, c_uint64, c_void_p, c_void_p, c_void_p, c_void_p, c_void_p,
+                         POINTER(c_void_p)),
     "patina_task_done": (c_void_p,),
     "patina_task_wait": (c_void_p,),
     "patina_task_take_cloud": (c_void_p, POINTER(c_void_p)),
     "patina_task_take_file": (c_void_p, POINTER(c_void_p)),
     "patina_task_destroy": (c_void_p,),
 }
-RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_message": c_size_t,
-           "patina_log_next": c_size_t, "patina_progress_destroy": None, "patina_progress_cancel": None,
-           "patina_progress_value": c_float, "patina_device_destroy": None, "patina_cloud_destroy": None,
-           "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
-           "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
-           "patina_builder_destroy": None, "patina_file_destroy": None, "patina_rows_destroy": None,
-           "patina_mesh_destroy": None, "patina_texture_destroy": None, "patina_mask_destroy": None,
-           "patina_grade_destroy": None, "patina_scans_destroy": None, "patina_field_destroy": None,
-           "patina_task_destroy": None}
+RESULTS = {"patina_version": c_char_p, "patina_struct_size": c_size_t, "patina_error_text": c_char_p,
+           "patina_message": c_size_t, "patina_log_next": c_size_t, "patina_progress_destroy": None,
+           "patina_progress_cancel": None, "patina_progress_value": c_float, "patina_device_destroy": None,
+           "patina_cloud_destroy": None, "patina_scene_destroy": None, "patina_frame_destroy": None,
+           "patina_frame_cancel": None, "patina_frame_progress": c_float, "patina_builder_destroy": None,
+           "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t, "patina_drawing_destroy": None,
+           "patina_file_destroy": None, "patina_rows_destroy": None, "patina_mesh_destroy": None,
+           "patina_texture_destroy": None, "patina_mask_destroy": None, "patina_grade_destroy": None,
+           "patina_scans_destroy": None, "patina_field_destroy": None, "patina_task_destroy": None}
 
 # effects.def: what Blender shows of each effect, and how
 EFFECTS = (
@@ -575,3 +650,4 @@ EFFECTS = (
           "high": 1},
      )},
 )
+OWN_EFFECTS = tuple(effect for effect in EFFECTS if effect["panel"] != "CAMERA")  # not the camera's

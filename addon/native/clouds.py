@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import ctypes
 import os
+import threading
 from collections.abc import Sequence
-from ctypes import byref, c_double, c_float, c_uint32
+from ctypes import byref, c_double, c_float, c_uint32, c_uint64
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,11 @@ from .loader import NEIGHBOURHOODS, TYPES
 KINDS = tuple(abi.KIND)  # patina_kind
 WRAPS = tuple(abi.WRAP)  # patina_wrap
 NO_PAGE = 2 ** 32 - 1  # PATINA_NO_PAGE
+
+
+def _room_for(most: int) -> list[np.ndarray]:
+    """Arrays of so many positions, colors, normals and scalars, NaN all of them."""
+    return [*(np.full((most, 3), np.nan, np.float32) for _ in range(3)), np.full(most, np.nan, np.float32)]
 
 
 class Cloud(Handle):
@@ -42,6 +48,11 @@ class Cloud(Handle):
     scan_numbers: tuple[int, ...] = ()
     renewed = ""  # what to tell of a saved cloud whose points were analyzed again
     losses: int | None = None  # of a mapped file: losses() as it was opened
+
+    def __new__(cls, *_: Any, **__: Any) -> Cloud:
+        cloud = super().__new__(cls)
+        cloud._turn = threading.RLock()  # the library takes one call at a time of a cloud; an analysis may be applied on another thread
+        return cloud
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
                  progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None,
@@ -73,6 +84,14 @@ class Cloud(Handle):
         cloud = cls.__new__(cls)
         Handle.__init__(cloud, os.fsencode(path), (c_double * 3)(*offset), create="patina_cloud_open_at")
         cloud.losses = losses()
+        cloud._learn()
+        return cloud
+
+    @classmethod
+    def load(cls, path: Path, progress: Progress | None = None) -> Cloud:
+        """A cloud of the points of a file that the library reads (PLY, XYZ, CSV, PTS, PTX, .conf), with their normals, colors and classes."""
+        cloud = cls.__new__(cls)
+        Handle.__init__(cloud, os.fsencode(path), handle_of(progress), create="patina_cloud_load")
         cloud._learn()
         return cloud
 
@@ -111,6 +130,30 @@ class Cloud(Handle):
         return {name: getattr(info, name) for name, _ in abi.PagesInfo._fields_[1:]}
 
     @staticmethod
+    def start_thinning(path: Path, offset: Sequence[float], most: int, hidden: np.ndarray | None = None) -> Task:
+        """A task that opens a saved cloud, and gives up to so many of its points, evenly chosen: positions (n, 3), linear colors (n, 3),
+        normals (n, 3) and scalars (n,), all float32, NaN where the cloud has none. offset: added to every position, float64. hidden: bits
+        of points that are left out, uint8."""
+        arrays, count = _room_for(most), c_uint64()
+        bits = () if hidden is None else (np.ascontiguousarray(hidden, np.uint8),)
+        return Task("thin", os.fsencode(path), (c_double * 3)(*offset), *([bits[0].ctypes.data, len(bits[0])] if bits else [None, 0]), most,
+                    *(values.ctypes.data for values in arrays), byref(count), keep=(arrays, count, bits),
+                    finish=lambda task: tuple(values[:count.value] for values in arrays))
+
+    def thinned(self, most: int) -> tuple[np.ndarray, ...]:
+        """The same of this cloud, at once; of one in pages those that arrived."""
+        arrays, count = _room_for(most), c_uint64()
+        self._call("thin", None, 0, most, *(values.ctypes.data for values in arrays), byref(count))
+        return tuple(values[:count.value] for values in arrays)
+
+    def places(self, most: int, hidden: np.ndarray | None = None) -> np.ndarray:
+        """(n, 3) float32: positions of up to so many points, without those whose bits are set in hidden."""
+        found, count = np.empty((most, 3), np.float32), c_uint64()
+        bits = None if hidden is None else np.ascontiguousarray(hidden, np.uint8)
+        self._call("thin", *((None, 0) if bits is None else (bits.ctypes.data, len(bits))), most, found.ctypes.data, None, None, None, byref(count))
+        return found[:count.value]
+
+    @staticmethod
     def start_verifying(path: Path, progress: Progress | None = None) -> Task:
         """A task that reads a saved cloud whole; its result() raises PatinaError where it is damaged."""
         return Task("verify", os.fsencode(path), handle_of(progress), keep=(progress,))
@@ -119,28 +162,14 @@ class Cloud(Handle):
         """A task that writes the cloud."""
         return Task("save", self._handle, os.fsencode(path), keep=(self,))
 
+    def _call(self, name: str, *arguments: Any) -> None:
+        with self._turn:
+            super()._call(name, *arguments)
+
     def _learn(self) -> None:
         info = abi.CloudInfo()
         self._call("get_info", byref(info))
-        self.count, self.drawn, self.bytes = info.count, info.drawn, info.bytes
-        self.footprint = max(info.bytes, 23 * info.count)  # with what of a mapped file may be in memory
-        self.invalid_positions = info.invalid_positions
-        self.has_normals = bool(info.has_normals)
-        self.has_colors = bool(info.has_colors)
-        self.class_bits = tuple(info.class_bits)  # classes that drawn points have
-        self.has_scalars = bool(info.has_scalars)
-        self.has_classes = bool(info.has_classes)
-        self.has_opacities = bool(info.has_opacities)
-        self.has_shapes = bool(info.has_shapes)  # analysed
-        self.normals_oriented = bool(info.normals_oriented)
-        self.kinds = tuple(info.kinds)  # points of each of KINDS
-        self.trusts = tuple(info.trusts)  # drawn points of each level of trust; see sync/analyses/trust.py
-        self.trust_default = info.trust_default  # least trust of points that are drawn by default
-        self.seen_through = info.seen_through  # points that a station saw through
-        self.uncolored = info.uncolored  # points with a color that their neighbors lent
-        self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
-        self.box = (tuple(info.box_min), tuple(info.box_max))
-        self.radius_most = info.radius_most  # of points' own radii, object units; 0: they have none
+        vars(self).update(_told(info))  # all at once: other threads read them
 
     def start_colors(self, colors: np.ndarray | None) -> Task:
         """Other colours for the same points; no picture of them may be drawn meanwhile."""
@@ -178,8 +207,9 @@ class Cloud(Handle):
     def start_analysis(self, progress: Progress | None = None, **given: Any) -> Task:
         """analyse, beside pictures: its result() changes the cloud, and no picture of it may be drawn then."""
         def apply(task: Task) -> None:
-            task._call("apply")
-            self._learn()
+            with self._turn:  # no other call of this cloud meets it, and none sees what is not learned yet
+                task._call("apply")
+                self._learn()
 
         described, kept = self.describe_analysis(**given)
         return Task("analyse", self._handle, byref(described), handle_of(progress), keep=(*kept, progress), finish=apply)
@@ -212,6 +242,32 @@ class Cloud(Handle):
         found = (c_float * 2)()
         self._call("scalar_range", share, found)
         return tuple(found)
+
+
+def _told(info: abi.CloudInfo) -> dict[str, Any]:
+    """What a cloud tells of itself, by attribute."""
+    return {
+        "count": info.count, "drawn": info.drawn, "bytes": info.bytes,
+        "footprint": max(info.bytes, 23 * info.count),  # with what of a mapped file may be in memory
+        "invalid_positions": info.invalid_positions,
+        "has_normals": bool(info.has_normals),
+        "has_colors": bool(info.has_colors),
+        "class_bits": tuple(info.class_bits),  # classes that drawn points have
+        "has_scalars": bool(info.has_scalars),
+        "has_classes": bool(info.has_classes),
+        "has_opacities": bool(info.has_opacities),
+        "has_shapes": bool(info.has_shapes),  # analysed
+        "normals_oriented": bool(info.normals_oriented),
+        "kinds": tuple(info.kinds),  # points of each of KINDS
+        "trusts": tuple(info.trusts),  # drawn points of each level of trust; see sync/analyses/trust.py
+        "trust_default": info.trust_default,  # least trust of points that are drawn by default
+        "seen_through": info.seen_through,  # points that a station saw through
+        "uncolored": info.uncolored,  # points with a color that their neighbors lent
+        "spacing": info.spacing,  # median, object units
+        "layer_distance": info.layer_distance,  # what d_min = 0 stands for at the median spacing, object units
+        "box": (tuple(info.box_min), tuple(info.box_max)),
+        "radius_most": info.radius_most,  # of points' own radii, object units; 0: they have none
+    }
 
 
 class Mesh(Handle):

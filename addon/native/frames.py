@@ -7,7 +7,7 @@ import ctypes
 import json
 import os
 from collections.abc import Sequence
-from ctypes import byref, c_uint32, c_void_p
+from ctypes import byref, c_double, c_uint32, c_void_p
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,12 @@ class Scene(Handle):
         self.clouds.append(cloud)
         self._kept += [handle for handle in (mask, grade, field, scans) if handle]
 
+    def ramp_range(self, instance: int) -> tuple[float, float]:
+        """The values at the ends of a cloud's ramp, automatic ones too; set the camera before. PatinaError where it has no points."""
+        found = (c_double * 2)()
+        self._call("ramp_range", instance, found)
+        return tuple(found)
+
     def add_mesh(self, mesh: Mesh, texture: Texture | None = None, **style: Any) -> None:
         self._call("add_mesh", mesh._handle, byref(abi.MeshStyle(texture=texture._handle if texture else None, **style)))
         self._kept += [mesh, texture] if texture else [mesh]
@@ -53,6 +59,20 @@ class Scene(Handle):
 
     def set_camera(self, **camera: Any) -> None:
         self._call("set_camera", byref(abi.Camera(**camera)))
+
+    def frame_camera(self, azimuth: float, elevation: float, fov: float) -> dict[str, Any]:
+        """The fields of a camera that frames the clouds: degrees around z, degrees above the horizon, vertical field of view in degrees (0:
+        45.8). Follows the aspect ratio of the settings."""
+        camera = abi.Camera()
+        self._call("frame_camera", azimuth, elevation, fov, byref(camera))
+        values = {name: getattr(camera, name) for name, _ in abi.Camera._fields_[1:]}
+        return values | {"world_from_camera": tuple(camera.world_from_camera)}
+
+    def extent(self) -> np.ndarray:
+        """(2, 3) float64: the corners of the box of all that may be drawn. Least corner above the greatest: nothing."""
+        corners = np.empty((2, 3))
+        self._call("extent", corners[0].ctypes.data, corners[1].ctypes.data)
+        return corners
 
     def set_settings(self, **settings: Any) -> None:
         self._call("set_settings", byref(abi.Settings(**settings)))

@@ -18,8 +18,8 @@ import numpy as np
 
 from . import abi
 
-MEMORY, FILE, FORMAT, CANCELLED, TOO_MANY_POINTS, INTERNAL = (
-    abi.ERROR[f"ERROR_{name}"] for name in ("MEMORY", "FILE", "FORMAT", "CANCELLED", "TOO_MANY_POINTS", "INTERNAL"))
+MEMORY, FILE, FORMAT, CANCELLED, TOO_MANY_POINTS, INTERNAL, TOO_LARGE = (
+    abi.ERROR[f"ERROR_{name}"] for name in ("MEMORY", "FILE", "FORMAT", "CANCELLED", "TOO_MANY_POINTS", "INTERNAL", "TOO_LARGE"))
 
 # Arrays of patina_neighbourhoods: type and width, 0: one number a point, -1: as many as neighbours.
 NEIGHBOURHOODS = {"normal": (np.float32, 3), "axis": (np.float32, 3), "spacing": (np.float32, 0), "half_axes": (np.float32, 2),
@@ -67,7 +67,7 @@ def library_path() -> Path:
 
 
 def library() -> ctypes.CDLL:
-    """Loads the library at the first call. PatinaError when it is missing or of another version."""
+    """Loads the library at the first call. PatinaError if it is missing or its interface differs from abi.py."""
     global _loaded
     with _loading:
         if _loaded is None:
@@ -84,22 +84,54 @@ def forget_library() -> None:
 
 def _load(path: Path) -> ctypes.CDLL:
     if not path.is_file():
-        raise PatinaError(f"Patina's library is missing: there is no {path}. Install the add-on's zip for this "
+        raise PatinaError(f"Patina's library is missing: there is no {path}. Install the package of Patina for this "
                           "platform, or let the environment variable PATINA_LIBRARY name the file")
     try:
         lib = ctypes.CDLL(str(path))
-        for name, arguments in abi.CALLS.items():
-            call = getattr(lib, name)
-            call.argtypes = arguments
-            call.restype = abi.RESULTS.get(name, c_int)
-    except (OSError, AttributeError) as error:
-        raise PatinaError(f"Patina's library {path} cannot be loaded: {error}") from None
-    version = lib.patina_version().decode()
-    if tuple(int(part) for part in version.split(".")[:2]) != abi.VERSION:
-        wanted = ".".join(str(part) for part in abi.VERSION)
-        raise PatinaError(f"Patina's library {path} is version {version}, the add-on needs {wanted}: "
-                          "restart Blender after an update")
+        lib.patina_version.restype = ctypes.c_char_p
+        version = lib.patina_version().decode("ascii")
+        given = tuple(int(part) for part in version.partition("+")[0].split(".")[:2])
+    except (OSError, AttributeError, ValueError) as error:
+        raise PatinaError(f"Patina's library {path} cannot be loaded: {error}. {_remedy()}") from None
+    needed = ".".join(str(part) for part in abi.VERSION)
+    if not fits(given, abi.VERSION):
+        raise PatinaError(f"Patina's library {path} has version {version}. This Patina needs version {needed}. {_remedy()}")
+    difference = _declare(lib)
+    if difference:
+        raise PatinaError(f"Patina's library {path}, version {version}, is not of the same build as this Patina, version {needed}: "
+                          f"{difference}. {_remedy()}")
     return lib
+
+
+def fits(library: tuple[int, ...], needed: tuple[int, ...]) -> bool:
+    """Whether a library of one (major, minor) version has the interface of another: before 1.0 the same, then a later minor one too."""
+    return library[:2] == needed[:2] if needed[0] == 0 else library[0] == needed[0] and library[1] >= needed[1]
+
+
+def _declare(lib: ctypes.CDLL) -> str:
+    """Sets the types of all calls. Returns what the library's interface lacks of abi.py, or ""."""
+    for name, arguments in abi.CALLS.items():
+        call = getattr(lib, name, None)
+        if call is None:
+            return f"it has no function {name}"
+        call.argtypes = arguments
+        call.restype = abi.RESULTS.get(name, c_int)
+    for name, kind in vars(abi).items():
+        if not isinstance(kind, type) or not issubclass(kind, ctypes.Structure) or not getattr(kind, "_fields_", None):
+            continue
+        called = "patina" + "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name)
+        size, own = lib.patina_struct_size(called.encode()), ctypes.sizeof(kind)
+        # A structure with struct_size may grow at its end. Others never change.
+        if size < own if issubclass(kind, abi.Descriptor) else size != own:
+            return f"its {called} has {size} bytes, {own} are needed"
+    return ""
+
+
+def _remedy() -> str:
+    """What the user can do about a library that does not fit."""
+    if os.environ.get("PATINA_LIBRARY"):
+        return "The environment variable PATINA_LIBRARY names this file: remove the variable, or let it name the library of this Patina"
+    return "Install Patina again, then restart the program that uses it"
 
 
 def _message(handle: c_void_p | None) -> str:

@@ -104,6 +104,18 @@ def pick(scene: Scene, instance: int, polygon: np.ndarray | None, frame: Frame |
     return bits
 
 
+def pick_nearest(scene: Scene, instance: int, polygon: np.ndarray, place: Sequence[float], frame: Frame | None = None
+                 ) -> tuple[int, np.ndarray, float] | None:
+    """Of the points that pick() would find in the outline, the one that is drawn nearest to a place, in pixels from the bottom left: its
+    number, its position in the object's space, (3,) float64, and how many pixels it is away. None: there is none."""
+    corners = np.ascontiguousarray(polygon, np.float64)
+    desc = abi.Pick(instance=instance, polygon=corners.ctypes.data, corners=len(corners))
+    found = abi.Picked()
+    check(library().patina_scene_pick_nearest(scene._handle, frame._handle if frame else None, byref(desc), (c_double * 2)(*place),
+                                              None, byref(found)), scene._handle, *([frame._handle] if frame else []))
+    return (found.number, np.array(found.position), found.distance) if found.found else None
+
+
 def highlight(frame: Frame, scene: Scene, pixels: np.ndarray, color: Sequence[float], strength: float) -> None:
     """Mixes a linear color into those of a COMBINED plane's pixels, (height, width, 4) float32, that show selected points of the scene,
     which the frame rendered last."""

@@ -7,20 +7,29 @@ from . import (
     add_light,
     addresses,
     analyze,
+    camera_paths,
     clips,
     colors,
     combine,
+    compare,
     convert_points,
+    drawings,
+    export_drawings,
     export_points,
     farm,
     import_points,
     level,
     linked_points,
+    measure,
+    measures,
     plan,
     points,
     points_keys,
     points_tools,
+    points_values,
     preferences,
+    reveal,
+    samples,
     scanner,
     scans,
     set_up,
@@ -29,13 +38,15 @@ from . import (
     stations,
     styles,
     untrusted,
+    view_from_here,
     view_transform,
     world,
 )
 
-_MODULES = (add_light, analyze, clips, colors, import_points, addresses, export_points, combine, convert_points, farm, level, linked_points, plan,
-            points, points_keys, points_tools, preferences, scanner, scans, set_up, shadows, soft_brush, stations, styles, untrusted,
-            view_transform, world)
+_MODULES = (add_light, analyze, camera_paths, clips, colors, import_points, addresses, export_points, combine, compare, convert_points, farm, level, linked_points, plan,
+            points, points_keys, points_tools, points_values, measure, measures, drawings, export_drawings, preferences, samples, reveal, scanner, scans,
+            set_up, shadows, soft_brush, stations, styles, untrusted,
+            view_from_here, view_transform, world)
 
 
 def register() -> None:

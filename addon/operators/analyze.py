@@ -125,12 +125,12 @@ class PATINA_OT_frame_points(Operator):
     @classmethod
     def poll(cls, context: Context) -> bool:
         return polls.allowed(cls, "the scene has no camera" if context.scene.camera is None else "") \
-            and any(_has_points(obj) for obj in context.view_layer.objects)
+            and any(point_data.may_have_points(obj) for obj in context.view_layer.objects)
 
     def execute(self, context: Context) -> set[str]:
         depsgraph = context.evaluated_depsgraph_get()
         try:
-            corners = _corners_of(depsgraph, {obj for obj in context.selected_objects if _has_points(obj)}, context.scene.frame_current)
+            corners = corners_of(depsgraph, {obj for obj in context.selected_objects if point_data.may_have_points(obj)}, context.scene.frame_current)
         except native.PatinaError as error:
             self.report({'ERROR'}, f"Patina: {error}")
             return {'CANCELLED'}
@@ -144,13 +144,17 @@ class PATINA_OT_frame_points(Operator):
         camera.matrix_world = Matrix.LocRotScale(place, rotation, camera.matrix_world.to_scale())
         if camera.data.type == 'ORTHO':
             camera.data.ortho_scale = scale
-        self._see(camera, place, corners)
+        self._see(camera, place, rotation @ Vector((0.0, 0.0, -1.0)), corners)
         _move_views(context, corners)
         return {'FINISHED'}
 
-    def _see(self, camera: bpy.types.Object, place: Vector, corners: list[Vector]) -> None:
-        """Nothing of it may be farther than the camera sees."""
+    def _see(self, camera: bpy.types.Object, place: Vector, forward: Vector, corners: list[Vector]) -> None:
+        """Nothing of it may be nearer or farther than the camera sees."""
+        near = min((corner - place).dot(forward) for corner in corners)
         far = max((corner - place).length for corner in corners)
+        if 0.0 < near < camera.data.clip_start:
+            camera.data.clip_start = 0.5 * near
+            self.report({'INFO'}, f"Patina: set the camera's Clip Start to {camera.data.clip_start:.4g}")
         if camera.data.clip_end < far:
             camera.data.clip_end = 1.2 * far
             self.report({'INFO'}, f"Patina: set the camera's Clip End to {camera.data.clip_end:.4g}")
@@ -174,11 +178,7 @@ def _move_views(context: Context, corners: list[Vector]) -> None:
         space.clip_start, space.clip_end = max(space.clip_start, NEAREST * reach), max(space.clip_end, reach)
 
 
-def _has_points(obj: bpy.types.Object) -> bool:
-    return point_data.may_have_points(obj)
-
-
-def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], frame: int) -> list[Vector]:
+def corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], frame: int) -> list[Vector]:
     """In the world: of the chosen objects and what they make, points of Geometry Nodes and instances; with none chosen of all that is
     points, without such of all. PatinaError where a file cannot be read."""
     points: list[Vector] = []
@@ -189,7 +189,7 @@ def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], f
     for instance in depsgraph.object_instances:
         obj = instance.object
         owner = instance.parent if instance.is_instance else obj
-        if not _has_points(obj) or chosen and owner.original not in chosen or not losses.is_placed(instance, []):
+        if not point_data.may_have_points(obj) or chosen and owner.original not in chosen or not losses.is_placed(instance, []):
             continue
         key = obj.data.as_pointer()
         if key not in boxes:
@@ -202,18 +202,19 @@ def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], f
 
 def _radius_of(obj: bpy.types.Object, surface: str, frame: int, known: dict[tuple[int, str], float]) -> tuple[float, float]:
     """How far beyond its place a point may show, as the radius of its disc or soft ball: in the world where one is set for all, and in the
-    object's units where points have their own."""
-    patina = obj.patina
-    if not patina.soft.use and surface != 'SPLATS':
-        return 0.0, 0.0
-    one = (patina.soft.radius if patina.soft.use_radius else 0.0) if patina.soft.use else patina.radius
-    if one > 0.0:
-        return one, 0.0
+    object's units where points have their own. Points of one object may be discs and balls."""
+    patina, soft = obj.patina, obj.patina.soft
+    balls = soft.use and not (soft.hide and soft.by != 'ALL')
+    discs = (not (balls and soft.by == 'ALL') and not patina.ranges.use
+             and (surface == 'SPLATS' or surface == 'AUTO' and analysis.wanted(obj) != 0))
+    ones = [soft.radius if soft.use_radius else 0.0] * balls + [patina.radius] * discs
+    if all(ones):
+        return max(ones, default=0.0), 0.0
     name = content.radius_name(obj, surface)
     key = (obj.data.as_pointer(), name)
     if key not in known:
         known[key] = _largest_radius(obj, name, frame)
-    return 0.0, known[key]
+    return max(ones), known[key]
 
 
 def _largest_radius(obj: bpy.types.Object, name: str, frame: int) -> float:
@@ -235,7 +236,7 @@ def _widened(corners: list[Vector], matrix: Matrix, radius: tuple[float, float])
     middle = sum(corners, Vector()) / len(corners)
     stretch = [matrix.col[k].to_3d().length for k in range(3)]
     most = max(stretch)
-    reach = [(radius[0] + radius[1] * most) / stretch[k] if stretch[k] > 0.0 else 0.0 for k in range(3)]
+    reach = [max(radius[0], radius[1] * most) / stretch[k] if stretch[k] > 0.0 else 0.0 for k in range(3)]
     signs = [[1.0 if i >> k & 1 else -1.0 for k in range(3)] for i in range(8)]
     half = [max(abs(corner[k] - middle[k]) for corner in corners) for k in range(3)]
     return [Vector(middle[k] + sign[k] * (half[k] + reach[k]) for k in range(3)) for sign in signs]

@@ -32,10 +32,7 @@ class _AddClip:
         empty.location = (lower + upper) / 2
         self._shape(empty, (upper - lower) / 2)
         context.collection.objects.link(empty)
-        for obj in context.selected_objects:
-            obj.select_set(False)
-        empty.select_set(True)
-        context.view_layer.objects.active = empty
+        point_data.select_alone(context, empty)
         return {'FINISHED'}
 
 

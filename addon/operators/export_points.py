@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""File > Export > Point Cloud: PLY, LAS, LAZ and E57, in the coordinates that the points came from."""
+"""File > Export > Point Cloud: PLY, LAS, LAZ, COPC and E57, in the coordinates that the points came from."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Context, Operator
-from bpy_extras.io_utils import ExportHelper
 
 from .. import jobs, native, point_data
 from ..read import importers
@@ -21,9 +20,10 @@ from ..sync.analyses import analysis, trust
 from ..sync.analyses.analyzing import ANALYSES
 from ..sync.points import attributes, edits, linked, origin
 from ..write import exporters
+from .export_dialog import ExportDialog
 
 
-class PATINA_OT_export_points(Operator, ExportHelper):
+class PATINA_OT_export_points(Operator, ExportDialog):
     """Export the points of mesh and point cloud objects with colors, normals and scalars, in the file's original coordinates"""
 
     bl_idname = "export_scene.patina_points"
@@ -35,34 +35,23 @@ class PATINA_OT_export_points(Operator, ExportHelper):
         items=(('PLY', "PLY", "Binary, with all scalars and float64 positions", 0),
                ('LAS', "LAS", "LAS 1.2, point format 3, with the scalars that LAS can store", 1),
                ('LAZ', "LAZ", "LAS 1.2, compressed. Needs the packages laspy and lazrs", 2),
-               ('E57', "E57", "One scan in the file per scan, with colors and intensity. Needs the package pye57", 3)))
+               ('E57', "E57", "One scan in the file per scan, with colors and intensity. Needs the package pye57", 3),
+               ('COPC', "COPC", "LAZ 1.4 as an octree, which programs and browsers read as needed. Needs the package lazrs", 4)))
     selected: BoolProperty(name="Selected Only", default=True, description="Export only the selected objects")
     trusted: BoolProperty(name="Trusted Only", default=False,
                           description="Leave out the untrusted points, as Trust does. At 0, leave out those that the automatic threshold would. "
                                       "Points without an analysis are analyzed first")
-    overwrite: BoolProperty(name="Overwrite", default=False, options={'HIDDEN', 'SKIP_SAVE'},
-                            description="Replace an existing file of the same name. The file dialog asks first")
     filter_glob: StringProperty(default=";".join(f"*.{name}" for name in exporters.NEEDS), options={'HIDDEN'})
-    filename_ext = ""
-    _seen = ""  # the format when the dialog last looked
 
-    def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
-        self._seen = self.kind
-        self.overwrite = True  # the file dialog marks a name that exists in red, and asks
-        return super().invoke(context, event)
+    def kind_of(self, path: Path) -> str:
+        try:
+            extension = exporters.extension_of(path)
+        except exporters.ExportError:
+            return ""
+        return 'COPC' if extension == "copc.laz" else extension.upper()
 
-    def check(self, _context: Context) -> bool:
-        """Of format and name the one that was changed decides."""
-        path = Path(self.filepath)
-        named = _kind_of(path)
-        if named not in {"", self.kind} and self.kind == self._seen:
-            self.kind = self._seen = named
-            return True
-        self._seen = self.kind
-        if named == self.kind:
-            return False
-        self.filepath = str(path.with_suffix(f".{self.kind.lower()}"))
-        return True
+    def ending_of(self, kind: str) -> str:
+        return "copc.laz" if kind == 'COPC' else kind.lower()
 
     def execute(self, context: Context) -> set[str]:
         try:
@@ -113,11 +102,11 @@ class PATINA_OT_export_points(Operator, ExportHelper):
     def _path(self) -> Path:
         """The file to write. ExportError if name and format disagree, or if the file exists and must stay."""
         path = Path(bpy.path.abspath(self.filepath))
-        named = exporters.extension_of(path)
+        named, ending = exporters.extension_of(path), self.ending_of(self.kind)
         if not named:
-            path = path.with_suffix(f".{self.kind.lower()}")
-        elif self.properties.is_property_set("kind") and named != self.kind.lower():
-            raise exporters.ExportError(f"'{path.name}' does not fit the format {self.kind}. Name the file .{self.kind.lower()}, or leave the format out")
+            path = path.with_name(f"{path.name}.{ending}")
+        elif self.properties.is_property_set("kind") and named != ending:
+            raise exporters.ExportError(f"'{path.name}' does not fit the format {self.kind}. Name the file .{ending}, or leave the format out")
         if path.exists() and not self.overwrite:
             raise exporters.ExportError(f"'{path}' exists. Choose another name, or set overwrite=True")
         return path
@@ -129,12 +118,6 @@ class PATINA_OT_export_points(Operator, ExportHelper):
                  if point_data.may_have_points(obj) and obj.visible_get() and (obj.select_get() or not self.selected)]
         points = [obj for obj in found if point_data.is_cloud(obj)]
         return (points, len(found) - len(points)) if points else (found, 0)
-
-
-def _kind_of(path: Path) -> str:
-    """The format that a name stands for, or ""."""
-    kind = path.suffix[1:].upper()
-    return kind if kind.lower() in exporters.NEEDS else ""
 
 
 def _gps_start(objects: list[bpy.types.Object]) -> float:
@@ -212,7 +195,7 @@ def _of_linked(obj: bpy.types.Object, scene: bpy.types.Scene, keep: np.ndarray |
     if points is None:
         raise native.PatinaError(notices[0] if notices else f"'{obj.name}': the file is missing")
     own = np.array(obj.original.get(origin.PROPERTY, points.origin), np.float64)
-    turn, move = _to_file(obj, scene)
+    turn, move = origin.to_file(obj, scene)
     normals = points.normals if points.normals is None else _turned(points.normals, turn)
     return exporters.Points((points.positions + (np.array(points.origin) - own)) @ turn.T + move, normals, _bytes(points.colors),
                             {name: values.astype(np.float32) for name, values in points.scalars.items()},
@@ -225,28 +208,12 @@ def _turned(normals: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return normals @ np.linalg.inv(turn) if np.linalg.det(turn) else normals
 
 
-def _to_file(obj: bpy.types.Object, scene: bpy.types.Scene) -> tuple[np.ndarray, np.ndarray]:
-    """(3, 3) and (3,): an evaluated object's coordinates → those of the file that it came from, or of the world."""
-    shared = origin.shared_of(obj.original, scene)
-    to_file = np.linalg.inv(origin.axes_of(obj.original))
-    own = np.array(obj.original.get(origin.PROPERTY, to_file @ shared), np.float64)
-    matrix = np.array(obj.matrix_world, np.float64)
-    turn, place = to_file @ matrix[:3, :3], matrix[:3, 3]
-    # an object that still lies where its import put it goes back to its file's coordinates to the last bit
-    home = origin.axes_of(obj.original) @ own - shared
-    at_place = np.allclose(place, home, rtol=0, atol=1e-3 + 1e-6 * np.abs(home).max())
-    if at_place and np.allclose(turn, np.eye(3), rtol=0, atol=1e-6):
-        turn = np.eye(3)
-    together = any(shared) or origin.SHARED in obj.original
-    return turn, own if at_place else to_file @ (shared + place) if together else own + to_file @ place
-
-
 def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> exporters.Points | None:
     count = point_data.count_of(data)
     local = attributes.positions(data, count) if count else None
     if local is None:
         return None
-    turn, move = _to_file(obj, scene)
+    turn, move = origin.to_file(obj, scene)
     positions = local.astype(np.float64) @ turn.T + move
     normals = attributes.normals(data, count, obj.patina.normal_attribute)
     colors = attributes.colors(data, count, obj.patina.color_attribute)
@@ -290,7 +257,7 @@ def _join(parts: list[exporters.Points]) -> exporters.Points | None:
 
 
 def _menu(self: bpy.types.Menu, _context: Context) -> None:
-    self.layout.operator(PATINA_OT_export_points.bl_idname, text="Point Cloud (.ply/.las/.laz/.e57)")
+    self.layout.operator(PATINA_OT_export_points.bl_idname, text="Point Cloud (.ply/.las/.laz/.copc.laz/.e57)")
 
 
 def register() -> None:

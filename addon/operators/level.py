@@ -12,18 +12,22 @@ from mathutils import Matrix, Vector
 
 from .. import jobs, native, point_data
 from ..read.importers import Progress
-from ..sync.analyses import upright
+from ..sync.analyses import measuring, upright
 from ..sync.points import attributes
 from . import polls
 from .steps import Stepped
 
+LINKED_POINTS = 200_000  # of a linked cloud that are looked at
 TILTED = "patina_tilt"  # custom property of an object: degrees, as the import estimated them
 
 
-def estimate(obj: Object, progress: Progress) -> jobs.Steps[upright.Vertical | None]:
-    """The vertical of an object's points, in their space. None if their planes do not tell."""
-    count = point_data.count_of(obj.data)
-    positions = attributes.positions(obj.data, count) if count else None
+def estimate(obj: Object, progress: Progress, frame: int = 0) -> jobs.Steps[upright.Vertical | None]:
+    """The vertical of an object's points, in their space. None if their planes do not tell. frame: for linked clouds."""
+    if obj.patina.linked_file:
+        positions = yield from measuring.linked_places(obj, frame, LINKED_POINTS, progress)
+    else:
+        count = point_data.count_of(obj.data)
+        positions = attributes.positions(obj.data, count) if count else None
     if positions is None:
         return None
     up = np.array(obj.matrix_world.to_3x3().transposed() @ Vector((0.0, 0.0, 1.0)), np.float64)
@@ -31,11 +35,10 @@ def estimate(obj: Object, progress: Progress) -> jobs.Steps[upright.Vertical | N
 
 
 def note(obj: Object, progress: Progress) -> jobs.Steps[str]:
-    """Estimates the tilt of new points and notes it for the panel. Returns a message, or "" if they are upright or unknown."""
+    """Estimates the tilt of new points and notes it for the panel. Returns a message, or "" if they are upright or unknown. Canceled, it
+    leaves the tilt unknown: the points are there."""
     try:
         found = yield from estimate(obj, progress)
-    except native.PatinaCancelled:
-        raise
     except native.PatinaError:
         return ""
     if found is None or not found.is_tilted:
@@ -56,7 +59,8 @@ class PATINA_OT_level(Stepped, Operator):
         obj = context.object
         if not point_data.may_have_points(obj) or obj.mode != 'OBJECT':
             return polls.allowed(cls, "Select points, in Object Mode")
-        return polls.allowed(cls, "" if point_data.holds_points(obj) else "Linked clouds and meshes with faces cannot be leveled")
+        there = obj.patina.linked_file or point_data.holds_points(obj)
+        return polls.allowed(cls, "" if there else "Meshes with faces cannot be leveled. Select a cloud")
 
     def execute(self, context: Context) -> set[str]:
         self._progress = Progress()
@@ -68,7 +72,7 @@ class PATINA_OT_level(Stepped, Operator):
 
     def _level(self, context: Context, obj: Object) -> jobs.Steps[set[str]]:
         try:
-            found = yield from estimate(obj, self._progress)
+            found = yield from estimate(obj, self._progress, context.scene.frame_current)
         except native.PatinaCancelled:
             self.report({'INFO'}, "Patina: canceled. Nothing was turned")
             return {'CANCELLED'}

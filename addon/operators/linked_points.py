@@ -7,14 +7,26 @@ from pathlib import Path
 
 import bpy
 from bpy.props import StringProperty
-from bpy.types import Context, Operator
+from bpy.types import Context, Object, Operator
 from bpy_extras.io_utils import ExportHelper
 
 from .. import jobs, native, point_data
 from ..read import importers
+from ..read.importers import saved
+from ..read.streaming.address import is_ept
 from ..sync.points import edits, files, linked, made, origin
 from ..write import exporters
-from . import export_points
+from . import export_points, polls
+
+
+def why_not(obj: Object) -> str:
+    """Why the points of a linked cloud cannot become a mesh, and what to do instead; "" if they can."""
+    path = obj.patina.linked_file
+    if saved.is_saved(Path(path)):
+        return "A saved cloud cannot be converted. Import the file that it was made from, without Link"
+    if is_ept(path):
+        return "An EPT folder cannot be converted. Import a file that it was made from, without Link"
+    return ""
 
 
 class PATINA_OT_linked_to_mesh(Operator):
@@ -27,7 +39,7 @@ class PATINA_OT_linked_to_mesh(Operator):
     @classmethod
     def poll(cls, context: Context) -> bool:
         obj = context.object
-        return obj is not None and obj.mode == 'OBJECT' and bool(obj.patina.linked_file)
+        return obj is not None and obj.mode == 'OBJECT' and bool(obj.patina.linked_file) and polls.allowed(cls, why_not(obj))
 
     def execute(self, context: Context) -> set[str]:
         obj, notices = context.object, []

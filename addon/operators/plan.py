@@ -4,8 +4,6 @@ asks for the sheet first. A render restores the scene."""
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -13,19 +11,19 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
-from .. import point_data
+from .. import point_data, whole
+from ..description.drawings import LEAST_PIXELS, DrawingError, Frame
 from ..draw.engine import PatinaRenderEngine
 from ..sync.points import origin
+from . import images_to_scale
+from .images_to_scale import WORLD_FILES
 
 INCH = 0.0254  # metres
-MOST = 65536  # pixels a side, of the library and of Blender
-WORLD_FILES = {".png": ".pgw", ".tif": ".tfw", ".tiff": ".tfw", ".jpg": ".jgw", ".jpeg": ".jgw"}
 SHEETS = {"A4": (0.210, 0.297), "A3": (0.297, 0.420), "A2": (0.420, 0.594), "A1": (0.594, 0.841), "A0": (0.841, 1.189),
           "LETTER": (0.2159, 0.2794), "TABLOID": (0.2794, 0.4318)}  # meters, upright
 _STEPS = (1.0, 2.0, 2.5, 5.0)  # of scales, times powers of ten
-_RESTORED = ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y", "use_border")
 
 
 def _dpi() -> FloatProperty:
@@ -104,66 +102,42 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
         path = Path(bpy.path.abspath(self.filepath))
         if path.suffix.lower() not in WORLD_FILES:
             path = path.with_name(path.name + ".png")
+        target = path.with_suffix(WORLD_FILES[path.suffix.lower()])
         box = _box(context)
         if box is None:
             self.report({'ERROR'}, "Patina: select objects with points first")
             return {'CANCELLED'}
-        pixel = _pixel(context.scene, self.scale, self.dpi)
-        width, height = _size(box, pixel, self.margin)
-        if max(width, height) > MOST:
-            self.report({'ERROR'}, f"Patina: a plan of {width:,} x {height:,} pixels; the most is {MOST:,} a side: "
-                                   "a smaller scale or fewer dots per inch make it fit")
-            return {'CANCELLED'}
-        if self.write_picture:
-            with _restored(scene):
-                camera = _set_up(context, None, box, pixel, width, height)
-                place = camera.location.copy()
-                try:
-                    if not _write(scene, path):
-                        return {'CANCELLED'}
-                finally:
-                    bpy.data.cameras.remove(camera.data)  # and its object
-            done = "The scene's camera and resolution are unchanged"
-        else:
-            known = bpy.data.objects.get("Plan")
-            usable = known and known.type == 'CAMERA' and known.name in scene.objects
-            camera = _set_up(context, known if usable else None, box, pixel, width, height)
-            place = camera.location
-            done = f"The scene now uses the camera '{camera.name}' and this resolution"
-        zero, unit = _survey(context)
-        corner = zero + (place.x - 0.5 * width * pixel, place.y + 0.5 * height * pixel, 0.0)
-        target = path.with_suffix(WORLD_FILES[path.suffix.lower()])
         try:
-            target.write_text(world_file(corner[0] / unit, corner[1] / unit, pixel / unit), encoding="ascii")
+            frame = frame_of(box, _pixel(scene, self.scale, self.dpi), self.margin)
+            width, height = frame.size()
+            if self.write_picture:
+                with images_to_scale.camera_for(scene, frame, width, height):
+                    if not images_to_scale.write(scene, path):
+                        return {'CANCELLED'}
+                done = "The scene's camera and resolution are unchanged"
+            else:
+                camera = _camera(scene)
+                images_to_scale.set_up(scene, camera, frame, width, height)
+                done = f"The scene now uses the camera '{camera.name}' and this resolution"
+            whole.write(target, images_to_scale.world_file(frame, width, height, *_survey(context)).encode("ascii"))
+        except DrawingError as error:
+            self.report({'ERROR'}, f"Patina: {error}")
+            return {'CANCELLED'}
         except OSError as error:
             self.report({'ERROR'}, f"Patina: {target.name} cannot be written: {error.strerror}")
             return {'CANCELLED'}
-        self.report({'INFO'}, f"{width:,} x {height:,} pixels of {pixel:.6g} units; world file {target.name}. {done}")
+        self.report({'INFO'}, f"{width:,} x {height:,} pixels of {frame.side:.6g} units; world file {target.name}. {done}")
         return {'FINISHED'}
 
 
-@contextlib.contextmanager
-def _restored(scene: bpy.types.Scene) -> Iterator[None]:
-    """Restores the scene's camera and resolution afterwards, whatever happens."""
-    camera, values = scene.camera, {name: getattr(scene.render, name) for name in _RESTORED}
-    try:
-        yield
-    finally:
-        scene.camera = camera
-        for name, value in values.items():
-            setattr(scene.render, name, value)
-
-
-def _write(scene: bpy.types.Scene, path: Path) -> bool:
-    """Renders the plan to a PNG or TIFF file. Returns False if the user canceled."""
-    render = scene.render
-    kept = render.filepath, render.use_file_extension, render.image_settings.file_format
-    render.filepath, render.use_file_extension = str(path), False
-    try:
-        render.image_settings.file_format = 'TIFF' if path.suffix.lower().startswith(".tif") else 'PNG'
-        return bpy.ops.render.render(write_still=True) == {'FINISHED'}
-    finally:
-        render.filepath, render.use_file_extension, render.image_settings.file_format = kept
+def _camera(scene: bpy.types.Scene) -> bpy.types.Object:
+    """The camera "Plan" of the scene, or a new one."""
+    known = bpy.data.objects.get("Plan")
+    if known and known.type == 'CAMERA' and known.name in scene.objects:
+        return known
+    camera = bpy.data.objects.new("Plan", bpy.data.cameras.new("Plan"))
+    scene.collection.objects.link(camera)
+    return camera
 
 
 def _pixel(scene: bpy.types.Scene, scale: float, dpi: float) -> float:
@@ -182,9 +156,10 @@ def scale_for(box: tuple[np.ndarray, np.ndarray], sheet: tuple[float, float], ma
 
 def _size_text(scene: bpy.types.Scene, box: tuple[np.ndarray, np.ndarray], scale: float, dpi: float, margin: float) -> str:
     """The size of the image in pixels, and of the file in megabytes before compression."""
-    width, height = _size(box, _pixel(scene, scale, dpi), margin)
-    if max(width, height) > MOST:
-        return f"{width:,} x {height:,} pixels. The most is {MOST:,} a side"
+    try:
+        width, height = frame_of(box, _pixel(scene, scale, dpi), margin).size()
+    except DrawingError as error:
+        return str(error)
     settings = scene.render.image_settings
     size = width * height * 4 * (2 if settings.color_depth in {'16', '32'} else 1)
     return f"{width:,} x {height:,} pixels, at most {size / 1e6:,.1f} MB"
@@ -196,12 +171,6 @@ def _survey(context: Context) -> tuple[np.ndarray, float]:
     if scanned is None:
         return np.array(context.scene.get(origin.PROPERTY, origin.ZERO), np.float64), 1.0
     return origin.shared_of(scanned, context.scene), float(np.linalg.norm(origin.axes_of(scanned)[:, 0]))
-
-
-def world_file(left: float, top: float, pixel: float) -> str:
-    """The six lines of a world file: a pixel's size, no rotation, the centre of the upper left pixel."""
-    values = (pixel, 0.0, 0.0, -pixel, left + 0.5 * pixel, top - 0.5 * pixel)
-    return "".join(f"{value:.10f}\n" for value in values)
 
 
 def _box(context: Context) -> tuple[np.ndarray, np.ndarray] | None:
@@ -216,33 +185,14 @@ def _box(context: Context) -> tuple[np.ndarray, np.ndarray] | None:
     return table.min(axis=0), table.max(axis=0)
 
 
-def _size(box: tuple[np.ndarray, np.ndarray], pixel: float, margin: float) -> tuple[int, int]:
-    extent = (box[1] - box[0])[:2]
-    room = extent + 2.0 * margin * extent.max()
-    width, height = (max(int(np.ceil(side / pixel - 1e-3)), 4) for side in room)  # Blender renders no less than 4 pixels
-    return width, height
-
-
-def _set_up(context: Context, camera: bpy.types.Object | None, box: tuple[np.ndarray, np.ndarray], pixel: float, width: int,
-            height: int) -> bpy.types.Object:
-    """Makes the scene render the plan. Returns the camera, a new one named "Plan" if None is given."""
-    scene, render = context.scene, context.scene.render
-    if camera is None:
-        camera = bpy.data.objects.new("Plan", bpy.data.cameras.new("Plan"))
-        scene.collection.objects.link(camera)
-    render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
-    render.pixel_aspect_x = render.pixel_aspect_y = 1.0
-    render.use_border = False
-    scene.camera = camera
+def frame_of(box: tuple[np.ndarray, np.ndarray], pixel: float, margin: float) -> Frame:
+    """The plan of a box from above, whose extent is whole pixels. Its plane is above the box."""
+    sides = (box[1] - box[0])[:2]
+    sides = np.maximum(np.ceil((sides + 2.0 * margin * sides.max()) / pixel - 1e-3), LEAST_PIXELS) * pixel
     middle, depth = 0.5 * (box[0] + box[1]), float(box[1][2] - box[0][2])
     room = max(0.01 * depth, 10.0 * pixel)
-    camera.matrix_world = Matrix.Translation((middle[0], middle[1], box[1][2] + 2.0 * room))
-    data = camera.data
-    data.type, data.sensor_fit = 'ORTHO', 'HORIZONTAL'
-    data.ortho_scale = width * pixel
-    data.shift_x = data.shift_y = 0.0
-    data.clip_start, data.clip_end = room, depth + 4.0 * room
-    return camera
+    return Frame(np.array((middle[0], middle[1], box[1][2] + room)), np.array((1.0, 0.0, 0.0)), np.array((0.0, 1.0, 0.0)), float(sides[0]), float(sides[1]),
+                 front=0.0, back=depth + 2.0 * room, scale=1.0, pixel=pixel)
 
 
 def _menu(self: bpy.types.Menu, context: Context) -> None:

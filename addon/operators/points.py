@@ -10,7 +10,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
-from bpy.types import Context, Object, Operator
+from bpy.types import Context, Event, Object, Operator
 
 from .. import jobs, native
 from ..native.points import pick
@@ -19,10 +19,8 @@ from ..sync import style_of
 from ..sync.analyses.analyzing import ANALYSES
 from ..sync.points import built, edits, files, linked, sequence
 from ..sync.view import clips
-from . import polls
-
-HOW = (('SET', "Set", "Select only these points", 0), ('ADD', "Extend", "Add to the selection", 1), ('SUB', "Subtract", "Remove from the selection", 2),
-       ('AND', "Intersect", "Keep only selected points that are also in this group", 3))
+from . import points_values, polls
+from .points_values import HOW
 
 
 def editable(obj: Object | None) -> str:
@@ -144,18 +142,34 @@ _items: list[tuple] = []  # Blender keeps no reference to the texts
 
 
 class PATINA_OT_points_select_by(Editing, Operator):
-    """Select the points of a class, of a scan, or inside the active clip box or plane"""
+    """Select the points of a class, of a scan, inside the active clip box or plane, or whose attribute lies within a range"""
 
     bl_idname = "object.patina_points_select_by"
     bl_label = "Select Points By"
 
-    by: EnumProperty(name="By", items=(('CLASS', "Class", "", 0), ('SCAN', "Scan", "", 1), ('CLIP', "Clip", "", 2)))
+    by: EnumProperty(name="By", items=(('CLASS', "Class", "", 0), ('SCAN', "Scan", "", 1), ('CLIP', "Clip", "", 2), ('VALUE', "Value", "", 3)))
     how: EnumProperty(name="How", items=HOW)
     number: IntProperty(name="Number", min=0, max=65535, description="Number of the class, or of the scan as stored in the file")
     clip: EnumProperty(name="Clip", items=_clip_items, options={'SKIP_SAVE'})
+    attribute: points_values.attribute_property()
+    least: points_values.limit_property(*points_values.LEAST)
+    most: points_values.limit_property(*points_values.MOST)
+
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        """Asks for a range that nobody gave."""
+        if self.by != 'VALUE' or self.properties.is_property_set("least") or self.properties.is_property_set("most"):
+            return self.execute(context)
+        self.least, self.most = points_values.suggested(context.object, self.attribute)
+        return context.window_manager.invoke_props_dialog(self, width=320)
+
+    def draw(self, _context: Context) -> None:
+        self.layout.use_property_split = True
+        of = {'CLASS': ("number",), 'SCAN': ("number",), 'CLIP': ("clip",), 'VALUE': ("attribute", "least", "most")}
+        for name in ("by", *of[self.by], "how"):
+            self.layout.prop(self, name)
 
     def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits:
-        found = {'CLASS': self._of_class, 'SCAN': self._of_scan, 'CLIP': self._in_clip}[self.by](context, obj, cloud)
+        found = {'CLASS': self._of_class, 'SCAN': self._of_scan, 'CLIP': self._in_clip, 'VALUE': self._of_value}[self.by](context, obj, cloud)
         return replace(old, selected=combine(self.how, old.selected, found))
 
     def _of_class(self, context: Context, obj: Object, cloud: native.Cloud) -> edits.Bits:
@@ -172,6 +186,12 @@ class PATINA_OT_points_select_by(Editing, Operator):
                                      "the file does not store the scan of each point")
         found = edits.of_flags(scans == cloud.scan_numbers.index(self.number))
         return found & drawn_alone(context, obj, cloud, lambda scene: pick(scene, 0, None))
+
+    def _of_value(self, context: Context, obj: Object, cloud: native.Cloud) -> edits.Bits:
+        found = points_values.within(points_values.of_linked(obj, self.attribute, context.scene.frame_current), self.least, self.most)
+        if len(found) != cloud.count:
+            raise native.PatinaError(f"the file has {len(found):,} points now, and the cloud {cloud.count:,}. Render once, then select again")
+        return edits.of_flags(found) & drawn_alone(context, obj, cloud, lambda scene: pick(scene, 0, None))
 
     def _in_clip(self, context: Context, obj: Object, cloud: native.Cloud) -> edits.Bits:
         found = context.scene.objects.get(self.clip)

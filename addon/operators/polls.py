@@ -3,7 +3,15 @@
 
 from __future__ import annotations
 
-from bpy.types import Operator
+from bpy.types import Context, Operator
+
+from .. import point_data
+from ..draw.engine import PatinaRenderEngine
+
+
+def has_points(context: Context) -> bool:
+    """Whether tools for points are of use: Patina is the engine, or the view layer has a cloud."""
+    return context.engine == PatinaRenderEngine.bl_idname or any(map(point_data.is_cloud, context.view_layer.objects))
 
 
 def allowed(operator: type[Operator], why: str) -> bool:

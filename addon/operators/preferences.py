@@ -8,13 +8,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
-from bpy.props import CollectionProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, StringProperty
 from bpy.types import Context, Event, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
 from .. import choices, jobs, native
 from ..read import importers, readers
-from ..sync.points import built, cache
+from ..sync.points import built, cache, kept
 from . import polls
 from .steps import Stepped
 
@@ -44,7 +44,7 @@ class _Installing(Stepped):
         if lacking:
             self.report({'WARNING'}, f"Patina: still missing: {', '.join(lacking)}. {readers.WITHOUT}")
         else:
-            self.report({'INFO'}, "Installed the readers of LAZ, COPC and E57")
+            self.report({'INFO'}, "Installed the packages for LAZ, COPC, E57 and DXF")
         return {'FINISHED'}
 
     def execute(self, context: Context) -> set[str]:
@@ -53,7 +53,7 @@ class _Installing(Stepped):
 
 
 class PATINA_OT_install_readers(_Installing, Operator):
-    """Download the missing packages for LAZ, COPC and E57 from PyPI into Patina's folder"""
+    """Download the missing packages for LAZ, COPC, E57 and DXF from PyPI into Patina's folder"""
 
     bl_idname = "patina.install_readers"
     bl_label = "Install Readers"
@@ -76,7 +76,7 @@ class PATINA_OT_install_readers(_Installing, Operator):
 
 
 class PATINA_OT_install_reader_files(_Installing, Operator, ImportHelper):
-    """Install the packages for LAZ, COPC and E57 from wheel files (.whl), without a network"""
+    """Install the packages for LAZ, COPC, E57 and DXF from wheel files (.whl), without a network"""
 
     bl_idname = "patina.install_reader_files"
     bl_label = "Install from Files..."
@@ -99,32 +99,50 @@ class PATINA_OT_install_reader_files(_Installing, Operator, ImportHelper):
         yield from readers.install(found, choices.readers_folder())
 
 
-class PATINA_OT_clear_cache(Operator):
-    """Delete the caches of linked files. They are rebuilt when needed"""
+class PATINA_OT_remove_caches(Operator):
+    """List what Patina has stored on this disk, and delete it. Caches are rebuilt or downloaded again when needed"""
 
-    bl_idname = "patina.clear_cache"
-    bl_label = "Clear"
+    bl_idname = "patina.remove_caches"
+    bl_label = "Remove Caches..."
     bl_options = {'REGISTER', 'INTERNAL'}
 
+    clouds: BoolProperty(name="Linked Clouds", default=True, options={'SKIP_SAVE'}, description="Caches of linked files. They are rebuilt when needed")
+    points: BoolProperty(name="Downloaded Points", default=True, options={'SKIP_SAVE'},
+                         description="Downloaded parts of COPC and EPT clouds. They are downloaded again when needed")
+    packages: BoolProperty(name="Installed Readers", default=False, options={'SKIP_SAVE'},
+                           description="Packages that Install Readers has put into Patina's folder. Delete them before you uninstall Patina")
+
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        self._stored = _stored()
+        return context.window_manager.invoke_props_dialog(self, width=500)
+
+    def draw(self, _context: Context) -> None:
+        for name, (folder, count, size) in self._stored.items():
+            box = self.layout.box()
+            row = box.row()
+            row.prop(self, name)
+            row.label(text=f"{count:,} file{'s' * (count != 1)}, {size / 1e9:.2f} GB")
+            box.label(text=str(folder))
+
     def execute(self, _context: Context) -> set[str]:
-        built.CACHE.clear()  # maps some of them
-        count, size = cache.clear()
-        self.report({'INFO'}, f"Deleted {count} files, {size / 1e9:.2f} GB")
+        deleted = []
+        if self.clouds:
+            built.CACHE.clear()  # maps some of them
+            deleted.append(cache.clear())
+        if self.points:
+            deleted.append(cache.clear_pages())
+            _looked.clear()
+        if self.packages:
+            deleted.append(readers.remove(choices.readers_folder().parent))
+        count, size = (sum(column) for column in zip(*deleted, strict=True)) if deleted else (0, 0)
+        self.report({'INFO'}, f"Deleted {count:,} file{'s' * (count != 1)}, {size / 1e9:.2f} GB")
         return {'FINISHED'}
 
 
-class PATINA_OT_clear_pages(Operator):
-    """Delete the downloaded points on this disk. They are downloaded again when needed"""
-
-    bl_idname = "patina.clear_pages"
-    bl_label = "Clear Fetched Points"
-    bl_options = {'REGISTER', 'INTERNAL'}
-
-    def execute(self, _context: Context) -> set[str]:
-        count, size = cache.clear_pages()
-        _looked.clear()
-        self.report({'INFO'}, f"Deleted {count:,} part{'s' * (count != 1)} of files, {size / 1e9:.2f} GB")
-        return {'FINISHED'}
+def _stored() -> dict[str, tuple[Path, int, int]]:
+    """By property of the operator: the folder, how many files of Patina it holds, and their bytes."""
+    packages = choices.readers_folder().parent
+    return {"clouds": (kept.folder(), *cache.held()), "points": (cache.pages_folder(), *cache.pages_held()), "packages": (packages, *readers.held(packages))}
 
 
 class PATINA_OT_open_manual(Operator):
@@ -169,7 +187,7 @@ def draw_help(menu: bpy.types.Menu, _context: Context) -> None:
     menu.layout.operator("patina.open_manual", text="Patina Manual", icon='HELP')
 
 
-_CLASSES = (PATINA_OT_install_readers, PATINA_OT_install_reader_files, PATINA_OT_clear_cache, PATINA_OT_clear_pages, PATINA_OT_open_manual)
+_CLASSES = (PATINA_OT_install_readers, PATINA_OT_install_reader_files, PATINA_OT_remove_caches, PATINA_OT_open_manual)
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(_CLASSES)
 

@@ -12,6 +12,7 @@ from bpy.types import Context, Operator
 from mathutils import Matrix, Vector
 
 from ..sync.analyses.analysis import SCANNERS
+from . import clip_range
 
 
 def positions(obj: bpy.types.Object | None) -> np.ndarray:
@@ -45,9 +46,9 @@ class PATINA_OT_camera_at_scanner(Operator):
             return {'CANCELLED'}
         data = bpy.data.cameras.new(f"{obj.name} scan {self.scan}")
         data.type = 'PANO' if self.panoramic else 'PERSP'
-        data.clip_start, data.clip_end = 0.05, 10000.0
-        camera = bpy.data.objects.new(data.name, data)
         place = obj.matrix_world @ Vector(known[self.scan])
+        clip_range.fit(data, clip_range.extent_of([place, *(obj.matrix_world @ Vector(corner) for corner in obj.bound_box)]))
+        camera = bpy.data.objects.new(data.name, data)
         camera.matrix_world = Matrix.Translation(place) @ Matrix.Rotation(math.pi / 2, 4, 'X')
         context.collection.objects.link(camera)
         context.scene.camera = camera

@@ -12,7 +12,7 @@ from mathutils import Vector
 
 from .. import native, point_data
 from ..draw.engine import PatinaRenderEngine
-from . import analyze, first_look, stations
+from . import analyze, clip_range, first_look, stations
 
 START = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}  # what Blender begins with
 LEAST = 0.05  # W/m2 from a lamp that count as light; the start scene's gives a cube beside it 1.5
@@ -60,7 +60,7 @@ def _reaches(lamp: Object, corners: Sequence[Vector]) -> bool:
 
 
 class PATINA_OT_set_up(Operator):
-    """Set the scene up for Patina: delete the default cube, frame the points, and look through the camera. Scan colors are shown unlit, intensity and classes as colors, and uncolored points in the style Plaster. Enables the headlight if no light reaches lit points"""
+    """Set up the scene: delete the default cube, frame the points, look through the camera. Scan colors are unlit, intensity and classes become colors, other points get the style Plaster. Adds a headlight if no light reaches lit points"""
 
     bl_idname = "scene.patina_set_up"
     bl_label = "Set Up for Points"
@@ -73,7 +73,8 @@ class PATINA_OT_set_up(Operator):
             self.report({'ERROR'}, "Patina: the scene has no points")
             return {'CANCELLED'}
         cube = scene.objects.get("Cube")
-        if untouched(scene) and cube:
+        fresh = untouched(scene)
+        if fresh and cube:
             bpy.data.objects.remove(cube)
         scene.render.engine = PatinaRenderEngine.bl_idname
         context.view_layer.update()
@@ -81,6 +82,7 @@ class PATINA_OT_set_up(Operator):
             obj.select_set(obj in points)
         if bpy.ops.object.patina_frame_points.poll():
             bpy.ops.object.patina_frame_points()
+            _fit_clips(context, points, fresh)
             _look_through_camera(context)
         for text in first_look.choose(scene, points):
             self.report({'INFO'}, text)
@@ -88,6 +90,20 @@ class PATINA_OT_set_up(Operator):
             scene.patina.studio.use_headlight = True
             self.report({'INFO'}, "No light reaches the points. Enabled the headlight for points without colors")
         return {'FINISHED'}
+
+
+def _fit_clips(context: Context, points: Sequence[Object], fresh: bool) -> None:
+    """The clip distances of the scene's camera and of the 3D views, for the points as they were framed just now. fresh: nobody has
+    chosen others."""
+    context.view_layer.update()
+    corners = [corner for obj in points for corner in _corners(context.scene, obj)]
+    extent = clip_range.extent_of(corners)
+    eye = context.scene.camera.matrix_world.translation
+    clip_range.fit(context.scene.camera.data, extent, max((corner - eye).length for corner in corners), not fresh)
+    for area in context.screen.areas if context.screen else ():
+        space = area.spaces.active
+        if area.type == 'VIEW_3D' and space.region_3d:
+            clip_range.fit(space, extent, 2.0 * (space.region_3d.view_distance + extent), not fresh)
 
 
 def _look_through_camera(context: Context) -> None:

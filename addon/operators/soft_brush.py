@@ -15,14 +15,13 @@ from ..properties.brush import RADIUS, STRENGTH, THROUGH
 from ..read import importers
 from . import polls
 from .soft_strokes import Stroke, swept, why_not, write
-from .view_tools import OverView, Place, is_view, place_of
+from .view_tools import NAVIGATION, OverView, Place, is_over, is_view, largest_view, place_of
 
 EVERY, SHARE = 0.25, 4.0  # seconds between two writings within a stroke; times as long as one takes, at least
 GROWTH = 1.15  # of the radius, a press
 
 _END = {'RET', 'NUMPAD_ENTER', 'ESC', 'RIGHTMOUSE'}
 _SIZES = {'LEFT_BRACKET': 1.0 / GROWTH, 'RIGHT_BRACKET': GROWTH, 'WHEELDOWNMOUSE': 1.0 / GROWTH, 'WHEELUPMOUSE': GROWTH}
-_NAVIGATION = ('MIDDLEMOUSE', 'WHEEL', 'TRACKPAD', 'MOUSEROTATE', 'MOUSESMARTZOOM', 'NDOF', 'NUMPAD_', 'HOME', 'TIMER')
 
 
 class PATINA_OT_soft_brush(OverView, Operator):
@@ -77,12 +76,10 @@ class PATINA_OT_soft_brush(OverView, Operator):
 
     def _in_a_view(self, context: Context) -> set[str]:
         """Begun by a button elsewhere."""
-        areas = [area for area in context.screen.areas if area.type == 'VIEW_3D'] if context.screen else []
-        if not areas:
+        view = largest_view(context)
+        if view is None:
             return self._refused("soft points are painted in a 3D view, and the window has none")
-        area = max(areas, key=lambda area: area.width * area.height)
-        region = next(region for region in area.regions if region.type == 'WINDOW')
-        with context.temp_override(area=area, region=region):
+        with context.temp_override(area=view[0], region=view[1]):
             bpy.ops.object.patina_soft_brush('INVOKE_DEFAULT')
         return {'CANCELLED'}  # this one
 
@@ -107,7 +104,7 @@ class PATINA_OT_soft_brush(OverView, Operator):
 
     def _waiting(self, context: Context, event: Event) -> set[str]:
         """Between strokes: all but what the brush needs is Blender's."""
-        over = self._is_over(context, event)
+        over = is_over(context, event)
         self._place = place_of(context, event) if over else None
         pressed = event.value == 'PRESS'
         if pressed and (event.type == 'ESC' or over and event.type in _END):
@@ -122,17 +119,9 @@ class PATINA_OT_soft_brush(OverView, Operator):
             self._tell(context)
         elif pressed and event.type in _SIZES and (event.ctrl or "BRACKET" in event.type):
             brush.radius *= _SIZES[event.type]
-        elif event.type.startswith(_NAVIGATION):
+        elif event.type.startswith(NAVIGATION):
             return {'PASS_THROUGH'}
         return {'RUNNING_MODAL'}
-
-    def _is_over(self, context: Context, event: Event) -> bool:
-        """Whether the mouse is over the view and not over one of the regions that may lie upon it."""
-        def holds(region: bpy.types.Region) -> bool:
-            return 0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
-
-        return holds(context.region) and not any(region.type != 'WINDOW' and region.width > 1 and region.height > 1 and holds(region)
-                                                 for region in context.area.regions)
 
     def _start(self, context: Context, event: Event) -> set[str]:
         why, brush = why_not(context.object), context.window_manager.patina_brush

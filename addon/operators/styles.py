@@ -96,7 +96,7 @@ class PATINA_OT_save_style(_StyleOperator, Operator):
         styles.write(path, styles.taken(label, context.scene, _points(context)))
         context.scene.patina.style.applied = key
         custom = _points(context).patina.colors
-        lost = custom.ramp == 'CUSTOM' and custom.source not in {'OWN', 'FIXED'}
+        lost = custom.ramp == 'CUSTOM' and custom.source not in {'OWN', 'FIXED', 'MATERIAL'}
         notices = ["a ramp of your own is not kept in the style"] if lost else []
         return notices + list(filter(None, [_picture(context, path.with_suffix(".png"), self.thumbnail == 'SCENE')]))
 

@@ -18,7 +18,8 @@ from ..description.scene import SceneDescription
 from ..description.view import View
 from ..draw import render, viewport
 from ..native.abi import SURFACE
-from ..native.points import pick
+from ..native.points import pick, pick_nearest
+from ..sync.analyses.analyzing import ANALYSES
 from ..sync.points import clouds, edits
 
 LINE = (1.0, 1.0, 1.0, 0.9)
@@ -26,7 +27,7 @@ FILL = (1.0, 1.0, 1.0, 0.06)
 Place = tuple[float, float]  # pixels of the view from its bottom left
 
 
-def _view(context: Context) -> View:
+def view_of(context: Context) -> View:
     """What the picture is that outlines are drawn on: the 3D view's; without one, as scripts have none, the final render's."""
     if context.region_data and context.space_data and context.space_data.type == 'VIEW_3D':
         return sync.viewport_view(context.region, context.space_data, context.region_data, context.scene)
@@ -38,7 +39,7 @@ def _view(context: Context) -> View:
 def describe(context: Context) -> SceneDescription:
     """The scene as the view shows it, its clouds built, light and lines left out: what stands where is all that is asked. Soft points
     count as surface, and range images show single points."""
-    depsgraph, view, notices = context.evaluated_depsgraph_get(), _view(context), []
+    depsgraph, view, notices = context.evaluated_depsgraph_get(), view_of(context), []
     drawing = viewport.of_area(context.area)
     trusted = drawing.trusted if drawing else sync.Trusted()
     space = context.space_data if context.region_data else None
@@ -49,6 +50,8 @@ def describe(context: Context) -> SceneDescription:
 
     items = clouds.collect(depsgraph, trusted.take(notices), notices, visible)
     description = sync.describe_items(depsgraph, view, notices, items)
+    if any(item.cloud.built is None for item in description.clouds):
+        ANALYSES.await_frames()  # building gives a cloud that is kept new colors, which a picture under way would meet
     with native.Progress() as progress:
         built = [replace(item, cloud=cloud, soft=None, style=replace(item.style, surface=0)) for item in description.clouds
                  if (cloud := jobs.finish(item.cloud.resolve(progress)))]
@@ -62,11 +65,12 @@ class Seen:
 
     def __init__(self, description: SceneDescription, names: Collection[str], through: bool) -> None:
         self._wanted = [(index, item.name) for index, item in enumerate(description.clouds) if item.name in names]
+        self._description = description
         device = render.device_for(description.device)
         self._scene = native.Scene()
         self._frame: native.Frame | None = None
         try:
-            render.describe(self._scene, description, ["COMBINED"])
+            render.describe(self._scene, description, ["COMBINED", "DEPTH"])
             if not through:
                 self._frame = native.Frame(device)
                 self._frame.render(self._scene)
@@ -81,6 +85,24 @@ class Seen:
             bits = pick(self._scene, index, outline, self._frame)
             found[name] = found[name] | bits if name in found else bits  # of instances each
         return found
+
+    def nearest(self, outline: np.ndarray, place: Place) -> tuple[str, np.ndarray] | None:
+        """Of the points in an outline the one that is drawn nearest to a place: its object, and where it is in the world."""
+        best: tuple[str, np.ndarray] | None = None
+        least = np.inf
+        for index, name in self._wanted:
+            found = pick_nearest(self._scene, index, outline, place, self._frame)
+            if found and found[2] < least:
+                matrix = np.array(self._description.clouds[index].style.world_from_object).reshape(4, 4)
+                best, least = (name, matrix[:3, :3] @ found[1] + matrix[:3, 3]), found[2]
+        return best
+
+    def depth(self) -> np.ndarray:
+        """(height, width, 1) float32, linear z, of what the view shows; infinity where nothing is."""
+        return self._frame.read("DEPTH")
+
+    def numbers(self) -> np.ndarray:
+        return self._frame.read_numbers()
 
     def close(self) -> None:
         if self._frame:
@@ -97,12 +119,34 @@ class Seen:
 # ---- operators -------------------------------------------------------------------------------------------------------
 
 
+# Begins of the events' types that move the view.
+NAVIGATION = ('MIDDLEMOUSE', 'WHEEL', 'TRACKPAD', 'MOUSEROTATE', 'MOUSESMARTZOOM', 'NDOF', 'NUMPAD_', 'HOME', 'TIMER')
+
+
 def is_view(context: Context) -> bool:
     return context.area is not None and context.area.type == 'VIEW_3D' and context.region.type == 'WINDOW'
 
 
+def is_over(context: Context, event: Event) -> bool:
+    """Whether the mouse is over the view and not over one of the regions that may lie upon it."""
+    def holds(region: bpy.types.Region) -> bool:
+        return 0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
+
+    return holds(context.region) and not any(region.type != 'WINDOW' and region.width > 1 and region.height > 1 and holds(region)
+                                             for region in context.area.regions)
+
+
 def place_of(context: Context, event: Event) -> Place:
     return (float(event.mouse_x - context.region.x), float(event.mouse_y - context.region.y))
+
+
+def largest_view(context: Context) -> tuple[bpy.types.Area, bpy.types.Region] | None:
+    """The largest 3D view of the window, for tools that a button elsewhere begins; None: there is none."""
+    areas = [area for area in context.screen.areas if area.type == 'VIEW_3D'] if context.screen else []
+    if not areas:
+        return None
+    area = max(areas, key=lambda area: area.width * area.height)
+    return area, next(region for region in area.regions if region.type == 'WINDOW')
 
 
 class OverView:

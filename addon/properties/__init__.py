@@ -16,10 +16,12 @@ from .automatic import switch
 from .brush import PatinaBrushProperties
 from .clips import PatinaClipProperties
 from .colors import PatinaColorProperties
+from .drawings import PatinaDrawingProperties
 from .effects import PatinaEffectsProperties
 from .heard import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
 from .lines import PatinaLinesProperties
 from .marks import PatinaMarksProperties
+from .measures import PatinaMeasure, PatinaMeasuresProperties
 from .numbers import attribute_names
 from .points import PatinaPointsProperties, PatinaScanProperties
 from .ranges import PatinaRangeProperties
@@ -306,6 +308,8 @@ class PatinaObjectProperties(PropertyGroup):
             ('OFF', "Whole", "Converted on first use, analyzed, and cached", 2)))
     sequence: PointerProperty(type=PatinaSequenceProperties, override=_OVERRIDE)
     points: PointerProperty(type=PatinaPointsProperties, override=_OVERRIDE)
+    measures: PointerProperty(type=PatinaMeasuresProperties, override=_OVERRIDE)
+    drawing: PointerProperty(type=PatinaDrawingProperties, override=_OVERRIDE)
     cast_shadows: BoolProperty(
         name="Cast", override=_OVERRIDE, default=True, description="The points cast shadows")
     receive_shadows: BoolProperty(
@@ -369,7 +373,7 @@ class PatinaViewLayerProperties(PropertyGroup):
 
 
 _CLASSES = (PatinaScanProperties, PatinaPointsProperties, PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
-            PatinaLinesProperties, PatinaMarksProperties, PatinaColorProperties, PatinaSoftProperties, PatinaRangeProperties, PatinaClipProperties, PatinaSceneProperties,
+            PatinaLinesProperties, PatinaMarksProperties, PatinaMeasure, PatinaMeasuresProperties, PatinaColorProperties, PatinaSoftProperties, PatinaRangeProperties, PatinaClipProperties, PatinaDrawingProperties, PatinaSceneProperties,
             PatinaObjectProperties, PatinaViewLayerProperties, PatinaWorldProperties, PatinaBrushProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties),
            (World, PatinaWorldProperties))

@@ -33,7 +33,9 @@ class PatinaColorProperties(PropertyGroup):
             ('HEIGHT', "Height", "Color ramp over the world's Z axis", 3),
             ('OBJECT_HEIGHT', "Local Height", "Color ramp over the object's Z axis", 4),
             ('DISTANCE', "Distance", "Color ramp over the distance from the camera", 5),
-            ('TRUST', "Trust", "Color ramp over the trust of each point. Points without an analysis have the fallback color", 6)))
+            ('TRUST', "Trust", "Color ramp over the trust of each point. Points without an analysis have the fallback color", 6),
+            # not the library's: to it these are the points' own colors
+            ('MATERIAL', "Material", "The base color of the material's nodes, evaluated for each point", 7)))
     scalar: StringProperty(
         name="Attribute", override=_OVERRIDE, description="Point attribute that the color ramp shows")
     contour: StringProperty(

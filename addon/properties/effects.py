@@ -7,7 +7,7 @@ from typing import Any
 
 from bpy.types import PropertyGroup
 
-from ..native.abi import EFFECTS
+from ..native.abi import OWN_EFFECTS
 from .automatic import switch
 from .heard import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 
@@ -37,9 +37,7 @@ def _property(field: dict[str, Any]) -> Any:
 def _properties() -> dict[str, Any]:
     """name → property; use_NAME switches the effect NAME."""
     found = {}
-    for effect in EFFECTS:
-        if effect["panel"] == "CAMERA":
-            continue
+    for effect in OWN_EFFECTS:
         found[f"use_{effect['name']}"] = BoolProperty(name=effect["label"], override=_OVERRIDE, default=False, description=effect["about"])
         for field in effect["fields"]:
             found[field["property"]] = _property(field)

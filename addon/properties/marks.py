@@ -32,6 +32,9 @@ class PatinaMarksProperties(PropertyGroup):
         name="Title", override=_OVERRIDE, description="First line of the title block. Empty: the scene's name")
     note: StringProperty(
         name="Note", override=_OVERRIDE, description="Second line of the title block, such as the author and the date")
+    use_measures: BoolProperty(
+        name="Measurements", override=_OVERRIDE, default=False,
+        description="Show measurements in the Overlay pass, and in the image if Burn In is enabled. The viewport always shows them")
     size: FloatProperty(
         name="Text Size", override=_OVERRIDE, default=1.0, min=0.25, max=8.0, soft_min=0.5, soft_max=3.0,
         description="Size of the text, relative to the image")

@@ -47,6 +47,9 @@ class PatinaSoftProperties(PropertyGroup):
     range_min: FloatProperty(name="From", override=_OVERRIDE, default=0.0, precision=3, description="Value that is mapped to 0")
     range_max: FloatProperty(name="To", override=_OVERRIDE, default=1.0, precision=3, description="Value that is mapped to 1")
     invert: BoolProperty(name="Invert", override=_OVERRIDE, default=False, description="Swap soft and solid points")
+    hide: BoolProperty(
+        name="Hide", override=_OVERRIDE, default=False,
+        description="Hide the points above the threshold instead of drawing them as soft balls. They cast no shadow and stay in exports")
     threshold: FloatProperty(
         name="Threshold", override=_OVERRIDE, default=0.5, min=0.0, max=1.0, subtype='FACTOR',
         description="Points with a mapped value above this are soft")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The packages that read LAZ and E57: which are missing, and how to install them. Each is optional: the add-on works without.
+"""The packages that read LAZ and E57, and that write DXF: which are missing, and how to install them. Each is optional: the add-on works
+without.
 
-The zips contain laspy and lazrs, with lazrs compiled for each Python in BROUGHT. pye57 is installed on request. What is installed goes
+The zips contain laspy and lazrs, with lazrs compiled for each Python in BROUGHT. pye57 and ezdxf are installed on request. What is installed goes
 to a folder of its own for each Python, at the end of Python's search path, so that nobody else's packages change. Blender's Python
 takes nothing from the user's, and on many systems pip must not touch the system's. Nothing here knows Blender. What only installing
 needs is imported there, because Blender's start waits for this module.
@@ -10,19 +11,25 @@ needs is imported there, because Blender's start waits for this module.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import importlib
 import importlib.machinery
 import importlib.util
+import shutil
 import sys
 from collections.abc import Generator, Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
 from .. import whole
 
-BROUGHT = "3.10 to 3.14"  # Pythons that the zip's lazrs is compiled for
+# Pythons that the zip's lazrs is compiled for. Blenders with extensions need Python 3.11.
+BROUGHT = f"{'3.11' if __package__.startswith('bl_ext.') else '3.10'} to 3.14"
 COMPILED = {"lazrs": "lazrs", "pye57": "libe57"}  # their modules that are compiled for one Python
 
-PACKAGES = {"lazrs": "LAZ and COPC", "laspy": "EPT", "pye57": "E57", "pyquaternion": "E57"}  # by what they read
+PACKAGES = {"lazrs": "LAZ and COPC", "laspy": "EPT", "pye57": "E57", "pyquaternion": "E57",  # by what they read
+            "ezdxf": "DXF", "fonttools": "DXF", "pyparsing": "DXF", "typing_extensions": "DXF"}  # or write
+MODULES = {"fonttools": "fontTools"}  # of packages whose module has another name
+WRITTEN = {"DXF"}  # formats that are written only
 
 # What can be done where no wheel exists.
 WITHOUT = "Convert LAZ files to LAS, and E57 files to PLY or LAS, with another program; these are read without packages"
@@ -41,7 +48,7 @@ def missing() -> list[str]:
 
 def _there(name: str) -> bool:
     with contextlib.suppress(ImportError, ValueError):
-        found = importlib.util.find_spec(name)
+        found = importlib.util.find_spec(MODULES.get(name, name))
         if found is None:
             return False
         if name not in COMPILED or found.submodule_search_locations is None:
@@ -62,7 +69,7 @@ def status() -> list[tuple[str, bool]]:
         needed = [name for name in PACKAGES if PACKAGES[name] == formats]
         absent = [name for name in needed if name in lacking]
         lines.append((f"{formats}: needs the Python package{'s' * (len(absent) > 1)} {' and '.join(absent)}" if absent else
-                      f"{formats}: can be read", not absent))
+                      f"{formats}: can be {'written' if formats in WRITTEN else 'read'}", not absent))
     return lines
 
 
@@ -107,6 +114,21 @@ def look_in(folder: Path) -> None:
     importlib.invalidate_caches()
 
 
+def held(folder: Path) -> tuple[int, int]:
+    """How many files of installed packages a folder holds, and their bytes. 0 if there is no folder."""
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
+    return len(sizes), sum(sizes)
+
+
+def remove(folder: Path) -> tuple[int, int]:
+    """Deletes the installed packages of all Pythons. Returns how many files and bytes are gone. Windows keeps those in use."""
+    before = held(folder)
+    shutil.rmtree(folder, ignore_errors=True)
+    importlib.invalidate_caches()
+    after = held(folder)
+    return before[0] - after[0], before[1] - after[1]
+
+
 def look_no_more_in(folder: Path) -> None:
     with contextlib.suppress(ValueError):
         sys.path.remove(str(folder))
@@ -116,8 +138,11 @@ def install(wheels: Iterable[Path], folder: Path) -> Iterator[str]:
     """Unpacks wheels into the folder, in place of what is there of theirs; says before each what it does. ReadersError, and the
     folder is as it was, when one is none, is for another Python or system, or cannot be written."""
     wheels = sorted(wheels)
+    sums = _sums()
     for wheel in wheels:
         _check(wheel)
+        if wheel.name in sums and sums[wheel.name] != _sum_of(wheel):
+            raise ReadersError(f"{wheel.name} is not the file that PyPI has under this name: its checksum differs. Fetch it again")
     folder.parent.mkdir(parents=True, exist_ok=True)
     try:
         with whole.Folder(".readers-", folder.parent) as place:
@@ -130,6 +155,19 @@ def install(wheels: Iterable[Path], folder: Path) -> Iterator[str]:
     except OSError as error:
         raise ReadersError(f"{folder}: {error.strerror or error}") from None
     look_in(folder)
+
+
+def _sums() -> dict[str, str]:
+    """The wheels that PyPI has of these packages: name → SHA-256 (build/reader_sums)."""
+    lines = (Path(__file__).parents[1] / "readers.sha256").read_text("utf-8").splitlines()
+    return {name: value for value, name in (line.split() for line in lines if not line.startswith("#"))}
+
+
+def _sum_of(wheel: Path) -> str:
+    try:
+        return hashlib.sha256(wheel.read_bytes()).hexdigest()
+    except OSError as error:
+        raise ReadersError(f"{wheel}: {error.strerror or error}") from None
 
 
 def _check(wheel: Path) -> None:
@@ -188,6 +226,10 @@ def download(folder: Path, command: list[str] | None = None) -> Iterator[str]:
             none.append(name)
         elif told:
             raise ReadersError(f"pip: {told[:200]}. {by_hand()}")
+    known = _sums()
+    strange = next((wheel.name for wheel in sorted(folder.glob("*.whl")) if wheel.name not in known), None)
+    if strange:
+        raise ReadersError(f"pip fetched {strange}, which is none of the files that this Patina was made for. {by_hand()}")
     if none:
         yield f"No wheels of {', '.join(none)}"
     if none == names:

@@ -50,7 +50,7 @@ LARGEST = 1 << 20  # bytes of a file
 SCENE = ("smooth", "use_shadows", "shadow_samples", "studio", "effects", "lines")
 POINTS = ("lighting", "opacity", "color", "ambient", "diffuse", "specular", "shininess", "colors.source", "colors.ramp",
           "colors.exposure", "colors.contrast")
-SOFT = tuple(f"soft.{name}" for name in ("use", "by", "attribute", "classes", "shape", "use_range", "range_min", "range_max", "invert",
+SOFT = tuple(f"soft.{name}" for name in ("use", "by", "attribute", "classes", "shape", "use_range", "range_min", "range_max", "invert", "hide",
                                          "threshold", "transition", "opacity"))
 TRUST = ("least_trust",)
 # What a style sets only if its file has one of it, or if the style before it had. That is noted in the property named behind it.
@@ -69,7 +69,7 @@ class Entry:
     path: Path
     label: str
     about: str
-    needs: tuple[str, ...] = ()  # data of points without which the style shows nothing of its own: "classes", "an analysis"
+    needs: tuple[str, ...] = ()  # data of points without which the style shows nothing of its own: "classes", "an analysis", ...
 
     @property
     def own(self) -> bool:
@@ -142,7 +142,8 @@ def _needs(points: Any) -> tuple[str, ...]:
     """Data that the section "points" of a file relies on."""
     points = points if isinstance(points, dict) else {}
     by = points.get("soft.by") if points.get("soft.use") is True else None
-    needs = {"classes": by == 'CLASSES', "an analysis": by == 'UNCERTAINTY' or points.get("colors.source") == 'TRUST'}
+    needs = {"classes": by == 'CLASSES', "a height above ground": by == 'ATTRIBUTE' and points.get("soft.attribute") == "height_above_ground",
+             "an analysis": by == 'UNCERTAINTY' or points.get("colors.source") == 'TRUST'}
     return tuple(name for name, needed in needs.items() if needed)
 
 
@@ -394,11 +395,12 @@ def animated(owner: bpy.types.ID) -> set[str]:
         return set()
     pairs = [(data.action, getattr(data, "action_slot", None))]
     pairs += [(strip.action, getattr(strip, "action_slot", None)) for track in data.nla_tracks for strip in track.strips]
-    curves = [curve for action, slot in pairs if action for curve in _curves(action, slot)]
+    curves = [curve for action, slot in pairs if action for curve in curves_in(action, slot)]
     return {curve.data_path for curve in (*curves, *data.drivers)}
 
 
-def _curves(action: bpy.types.Action, slot: Any) -> list[bpy.types.FCurve]:
+def curves_in(action: bpy.types.Action, slot: Any) -> list[bpy.types.FCurve]:
+    """The F-curves of an action; slot: that of the owner, from Blender 4.4 on."""
     if hasattr(action, "fcurves"):  # until Blender 4.5
         return list(action.fcurves)
     bags = [strip.channelbag(slot) for layer in action.layers for strip in layer.strips]

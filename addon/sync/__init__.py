@@ -86,5 +86,5 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
         behind=behind,
         shadow_file=settings.shadow_file(scene),
         notices=notices,
-        marks=marks.read(scene, view, points),
+        marks=marks.read(scene, view, points, depsgraph.view_layer),
     )

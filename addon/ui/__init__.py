@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 from . import (
+    animation,
     colors,
     combine,
     cryptomatte,
+    drawings,
     effects,
     lines,
     marks,
     materials,
+    measures,
     motion,
     panels,
     panorama,
@@ -29,8 +32,8 @@ from . import (
 )
 
 # What makes the look comes first, then how it is drawn.
-_MODULES = (presets, styles, lines, effects, panels, sampling, marks, cryptomatte, points, trust, colors, soft, ranges, scan_points, motion, combine, panorama,
-            sequence, materials, world, statistics, standard)
+_MODULES = (presets, styles, lines, effects, panels, sampling, marks, cryptomatte, points, measures, drawings, trust, colors, soft, ranges, scan_points, motion, combine, panorama,
+            sequence, materials, world, statistics, animation, standard)
 
 
 def register() -> None:

@@ -31,11 +31,14 @@ class PATINA_MT_color_by(Menu):
 
     def draw(self, context: Context) -> None:
         layout, obj = self.layout, context.object
+        layout.operator_context = 'INVOKE_DEFAULT'
         for choice in coloring.choices(obj):
             layout.operator("object.patina_color_by", text=choice.label).choice = choice.label
+        layout.separator()
         if not obj.patina.linked_file and "spacing" not in obj.data.attributes:
-            layout.separator()
             layout.operator("object.patina_analyze", text="Analyze for Spacing, Thickness, Kind")
+        layout.operator("object.patina_cloud_distance", text="Measure Distance to Cloud")
+        layout.operator("object.patina_height_above_ground", text="Measure Height Above Ground")
 
 
 def draw_color_by(layout: UILayout, obj: Object) -> None:
@@ -71,10 +74,15 @@ class PATINA_PT_color(ColorPanel, Panel):
                 layout.prop(group, "contour")
             else:
                 layout.prop_search(group, "contour", obj.data, "attributes")
-        if group.source not in {'OWN', 'FIXED'}:
+        if group.source not in {'OWN', 'FIXED', 'MATERIAL'}:
             self._draw_ramp(group)
         layout.prop(group, "exposure")
         layout.prop(group, "contrast")
+        if not obj.patina.linked_file:
+            column = layout.column(align=True)
+            column.operator_context = 'INVOKE_DEFAULT'
+            column.operator("object.patina_cloud_distance")
+            column.operator("object.patina_height_above_ground")
 
     def _draw_ramp(self, group: bpy.types.PropertyGroup) -> None:
         layout = self.layout

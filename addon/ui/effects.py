@@ -8,13 +8,14 @@ from typing import Any
 import bpy
 from bpy.types import Context, Panel
 
-from ..native.abi import EFFECTS
+from ..native.abi import OWN_EFFECTS
 from . import rows
 from .panels import PatinaPanel
 
 
-class PATINA_PT_depth_cues(PatinaPanel, Panel):
-    bl_label = "Depth Cues"
+class _Group(PatinaPanel):
+    """The panel above the panels of effects of one kind."""
+
     bl_context = "render"
     bl_options = {'DEFAULT_CLOSED'}
 
@@ -22,20 +23,9 @@ class PATINA_PT_depth_cues(PatinaPanel, Panel):
         pass
 
 
-class PATINA_PT_drawing(PatinaPanel, Panel):
-    bl_label = "Drawing"
-    bl_context = "render"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, _context: Context) -> None:
-        pass
-
-
-class _EffectPanel(PatinaPanel):
+class _EffectPanel(_Group):
     """A switch in the head, properties below."""
 
-    bl_context = "render"
-    bl_options = {'DEFAULT_CLOSED'}
     effect: dict[str, Any] = {}
 
     def draw_header(self, context: Context) -> None:
@@ -59,14 +49,14 @@ class _EffectPanel(PatinaPanel):
             row.prop(effects, field["property"])
 
 
-def _panel(effect: dict[str, Any]) -> type:
-    """The panel of an effect."""
-    parent = "PATINA_PT_depth_cues" if effect["panel"] == "CUES" else "PATINA_PT_drawing"
-    return type(f"PATINA_PT_{effect['name']}", (_EffectPanel, Panel), {
-        "bl_label": effect["label"], "bl_parent_id": parent, "effect": effect, "__module__": __name__})
+def _panel(base: type, name: str, label: str, **values: Any) -> type:
+    return type(f"PATINA_PT_{name}", (base, Panel), {"bl_label": label, "__module__": __name__, **values})
 
 
-PANELS = tuple(_panel(effect) for effect in EFFECTS if effect["panel"] != "CAMERA")
-_CLASSES = (PATINA_PT_depth_cues, PATINA_PT_drawing, *PANELS)
+# panel of effects.def → name and label of the panel above. A panel without effects is not shown.
+_GROUPS = {"CUES": ("depth_cues", "Depth Cues"), "DRAWING": ("drawing", "Drawing"), "IMAGE": ("image", "Whole Image")}
+PANELS = tuple(_panel(_EffectPanel, effect["name"], effect["label"], effect=effect, bl_parent_id=f"PATINA_PT_{_GROUPS[effect['panel']][0]}")
+               for effect in OWN_EFFECTS)
+_CLASSES = (*(_panel(_Group, *_GROUPS[panel]) for panel in dict.fromkeys(effect["panel"] for effect in OWN_EFFECTS)), *PANELS)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

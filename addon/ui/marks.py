@@ -32,6 +32,7 @@ class PATINA_PT_marks(PatinaPanel, Panel):
         column.active = marks.use_title
         column.prop(marks, "title")
         column.prop(marks, "note")
+        layout.prop(marks, "use_measures")
         layout.prop(marks, "size")
         layout.prop(marks, "burn")
 

@@ -6,6 +6,9 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Material, Node, Panel
 
+from .. import point_data
+from ..sync.points import node_colors
+from . import rows
 from .panels import PatinaPanel
 
 _INPUTS = {'BSDF_PRINCIPLED': "Base Color", 'BSDF_DIFFUSE': "Color"}
@@ -28,6 +31,9 @@ class PATINA_PT_material(PatinaPanel, Panel):
             layout.template_node_view(material.node_tree, node, node.inputs[_INPUTS[node.type]])
         else:
             layout.prop(material, "diffuse_color", text="Base Color")
+        unknown = node_colors.unknown_of(context.object, material) if context.object and point_data.is_cloud(context.object) else ""
+        if unknown:
+            rows.sentence(context, layout, unknown, 'INFO')
 
 
 def _node(material: Material) -> Node | None:

@@ -206,6 +206,7 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
             else:
                 column.prop(patina, "stream")
             column.operator("object.patina_linked_to_mesh")
+            column.operator("object.patina_level")
         else:
             if context.object.type == 'POINTCLOUD':
                 column.operator("object.patina_to_mesh")

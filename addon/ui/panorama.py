@@ -42,6 +42,7 @@ class PATINA_PT_scanner(_DataPanel, Panel):
         count = int(np.isfinite(scanner.positions(context.object)).all(axis=1).sum())
         self.layout.label(text=f"{count} position{'s' * (count > 1)} of scanners")
         self.layout.operator(scanner.PATINA_OT_camera_at_scanner.bl_idname)
+        self.layout.operator("view3d.patina_view_from_here")
         self.layout.operator("object.patina_add_stations")
 
 

@@ -35,7 +35,7 @@ class _FirstLines:
         draw_color_by(column, context.object)
         if colors.source == 'FIXED':
             column.prop(patina, "color", text=" ")
-        elif colors.source != 'OWN':
+        elif colors.source not in {'OWN', 'MATERIAL'}:
             column.prop(colors, "ramp")
         layout.prop(patina, "opacity")
         layout.prop(patina, "lighting")

@@ -35,6 +35,8 @@ class PATINA_MT_points(Menu):
         for action, text in (('SELECT', "All"), ('DESELECT', "None"), ('INVERT', "Invert")):
             layout.operator("object.patina_points_select_all", text=text).action = action
         layout.operator("object.patina_select_untrusted", text="Untrusted")
+        operator = layout.operator("object.patina_points_select_by", text="By Value...")
+        operator.by, operator.how = 'VALUE', 'SET'
         layout.separator()
         layout.operator("object.patina_points_hide", text="Hide Selected").unselected = False
         layout.operator("object.patina_points_hide", text="Hide Unselected").unselected = True
@@ -60,6 +62,8 @@ class PATINA_PT_points_edit(_LinkedPanel, Panel):
         for action, text in (('SELECT', "All"), ('DESELECT', "None"), ('INVERT', "Invert")):
             row.operator("object.patina_points_select_all", text=text).action = action
         column.operator("object.patina_select_untrusted")
+        operator = column.operator("object.patina_points_select_by", text="Select by Value...")
+        operator.by, operator.how = 'VALUE', 'SET'
         row = layout.row(align=True)
         row.prop(group, "class_number")
         operator = row.operator("object.patina_points_select_by", text="Select")

@@ -47,6 +47,9 @@ class PATINA_PT_soft(ColorPanel, Panel):
         if group.by != 'ALL':
             self._draw_threshold(layout, group)
             self._draw_histogram(context, layout, obj)
+            layout.prop(group, "hide")
+        layout = layout.column()
+        layout.active = not (group.hide and group.by != 'ALL')
         layout.prop(group, "transition")
         layout.prop(group, "opacity")
         row = layout.row(heading="Radius")

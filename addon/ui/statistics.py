@@ -9,7 +9,7 @@ from bpy.types import Context, Panel
 from .. import point_data, versions
 from ..draw import pace, viewport
 from ..draw.engine import PatinaRenderEngine
-from ..operators import set_up
+from ..operators import set_up, view_from_here
 from ..sync.analyses.analyzing import ANALYSES
 from . import rows
 
@@ -50,7 +50,12 @@ class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
     bl_order = 2
 
     def draw(self, context: Context) -> None:
-        self.layout.operator("object.patina_frame_points")
+        column = self.layout.column(align=True)
+        column.operator("object.patina_frame_points")
+        column.operator(view_from_here.PATINA_OT_view_from_here.bl_idname)
+        row = column.row(align=True)
+        row.operator_context = 'INVOKE_REGION_WIN'  # the view, not the sidebar
+        row.operator(view_from_here.PATINA_OT_walk.bl_idname)
         self.layout.prop(context.scene.patina.studio, "use_headlight")
 
 

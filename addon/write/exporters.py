@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes points to files, with the origin added back in float64: PLY (binary, little endian), LAS 1.2, LAZ and E57. Does not import bpy.
+"""Writes points to files, with the origin added back in float64: PLY (binary, little endian), LAS 1.2, LAZ, COPC and E57. Does not import
+bpy.
 
-LAZ needs the packages laspy and lazrs, E57 needs pye57 (readers.py installs them).
+LAZ needs the packages laspy and lazrs, COPC needs lazrs, E57 needs pye57 (readers.py installs them).
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ import numpy as np
 from .. import whole
 from ..read import readers
 from ..read.importers.scans import Scan
+from . import copc
 
 # The packages that each format needs, by the extension of its files.
-NEEDS = {"ply": (), "las": (), "laz": ("laspy", "lazrs"), "e57": ("pye57", "pyquaternion")}
+NEEDS = {"ply": (), "las": (), "laz": ("laspy", "lazrs"), "copc.laz": ("lazrs",), "e57": ("pye57", "pyquaternion")}
 _LAZ_PIECE = 1_000_000  # points that are compressed at a time: 34 MB of records
 
 
@@ -30,9 +32,7 @@ class ExportError(Exception):
 
 def extension_of(path: Path) -> str:
     """The format that a file name stands for, "" if it has no extension. ExportError if the extension is not one of NEEDS."""
-    extension = path.suffix.lower()[1:]
-    if path.name.lower().endswith(".copc.laz"):
-        raise ExportError(f"'{path.name}': COPC files cannot be written. Export .laz and convert it, for example with untwine")
+    extension = "copc.laz" if path.name.lower().endswith(".copc.laz") else path.suffix.lower()[1:]
     if extension and extension not in NEEDS:
         raise ExportError(f"'{path.name}': points cannot be written as .{extension}. Use {', '.join('.' + name for name in NEEDS)}")
     return extension
@@ -46,7 +46,7 @@ def write(path: Path, points: Points, gps_time_start: float = 0.0) -> list[str]:
     extension = extension_of(path)
     missing = [name for name in NEEDS[extension] if readers.lacks(name)]
     if missing:
-        raise ExportError(f"'{path.name}': {extension.upper()} needs the Python package {' and '.join(missing)}. "
+        raise ExportError(f"'{path.name}': {extension.partition('.')[0].upper()} needs the Python package {' and '.join(missing)}. "
                           "Use Install Readers in the add-on's preferences")
     with whole.Folder(".patina-export-", path.parent) as folder:
         part = folder / f"points.{extension}"
@@ -127,46 +127,55 @@ def write_ply(path: Path, points: Points) -> list[str]:
 
 
 # Scalars that a LAS record has a place for, with what fits.
-_LAS_SCALARS = (("intensity", "intensity", 65535), ("class", "raw_classification", 31), ("user_data", "user_data", 255),
+_LAS_SCALARS = (("intensity", "intensity", 65535), ("class", "raw_classification", 255), ("user_data", "user_data", 255),
                 ("point_source_id", "point_source_id", 65535))
+_LAS_3 = np.dtype([("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("intensity", "<u2"), ("bit_fields", "u1"),
+                   ("raw_classification", "u1"), ("scan_angle_rank", "i1"), ("user_data", "u1"),
+                   ("point_source_id", "<u2"), ("gps_time", "<f8"), ("red", "<u2"), ("green", "<u2"), ("blue", "<u2")])
 
 
-def write_las(path: Path, points: Points, gps_time_start: float = 0.0) -> list[str]:
-    """LAS 1.2, point format 3, 0.1 mm steps where the box allows. Returns the names of scalars that it has no place
-    for."""
-    positions = points.positions
-    lower, upper = positions.min(axis=0), positions.max(axis=0)
-    offset = np.floor(lower)
-    scale = np.maximum(1e-4, 2.0 ** np.ceil(np.log2(np.maximum(upper - offset, 1e-9) / 2 ** 31)))
-    kind = np.dtype([("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("intensity", "<u2"), ("bit_fields", "u1"),
-                     ("raw_classification", "u1"), ("scan_angle_rank", "i1"), ("user_data", "u1"),
-                     ("point_source_id", "<u2"), ("gps_time", "<f8"), ("red", "<u2"), ("green", "<u2"), ("blue", "<u2")])
+def _las_rows(points: Points, kind: np.dtype, gps_time_start: float) -> tuple[np.ndarray, float, np.ndarray, list[str]]:
+    """Records, the step and offset (3,) of their coordinates, and the names of scalars that they have no place for. Steps are 0.1 mm
+    where the box allows. kind: _LAS_3, or one of copc.py, which holds more classes and returns."""
+    positions, first = points.positions, kind == _LAS_3
+    offset = np.floor(positions.min(axis=0))
+    scale = max(1e-4, 2.0 ** math.ceil(math.log2(max(float((positions.max(axis=0) - offset).max()), 1e-9) / (2 ** 31 - 1))))
     rows = np.zeros(len(positions), kind)
     for i, axis in enumerate("XYZ"):
-        rows[axis] = np.rint((positions[:, i] - offset[i]) / scale[i])
-    rows["bit_fields"] = 1 | 1 << 3  # the only return of its pulse
+        rows[axis] = np.rint((positions[:, i] - offset[i]) / scale)
+    bits, most_returns = (3, 7) if first else (4, 15)
+    rows["bit_fields"] = 1 | 1 << bits  # the only return of its pulse
     left = set(points.scalars)
     for name, target, most in _LAS_SCALARS:
         if name in points.scalars:
             left.discard(name)
-            rows[target] = np.clip(np.nan_to_num(points.scalars[name]), 0, most)
-    if {"return_number", "number_of_returns"} <= left:
-        left -= {"return_number", "number_of_returns"}
-        numbers = (np.clip(points.scalars[name], 0, 7).astype(np.uint8) for name in ("return_number",
-                                                                                      "number_of_returns"))
-        first, second = numbers
-        rows["bit_fields"] = first | second << 3
+            rows[target] = np.clip(np.nan_to_num(points.scalars[name]), 0, 31 if first and name == "class" else most)
+    returns = ("return_number", "number_of_returns")
+    if left.issuperset(returns):
+        left.difference_update(returns)
+        number, total = (np.clip(np.nan_to_num(points.scalars[name]), 0, most_returns).astype(np.uint8) for name in returns)
+        rows["bit_fields"] = number | total << bits
     if "gps_time" in left:
         left.discard("gps_time")
         rows["gps_time"] = points.scalars["gps_time"].astype(np.float64) + gps_time_start
     if points.colors is not None:
         for i, name in enumerate(("red", "green", "blue")):
             rows[name] = points.colors[:, i].astype(np.uint16) * 257
-    crs = points.crs.encode()[:65534] + b"\0" if points.crs else b""
+    return rows, scale, offset, sorted(left)
+
+
+def _crs(points: Points) -> bytes:
+    return points.crs.encode()[:65534] + b"\0" if points.crs else b""
+
+
+def write_las(path: Path, points: Points, gps_time_start: float = 0.0) -> list[str]:
+    """LAS 1.2, point format 3. Returns the names of scalars that it has no place for."""
+    rows, scale, offset, left = _las_rows(points, _LAS_3, gps_time_start)
+    lower, upper = points.positions.min(axis=0), points.positions.max(axis=0)
     with open(path, "wb") as file:
-        file.write(_las_header(len(rows), crs, scale, offset, lower, upper))
+        file.write(_las_header(len(rows), _crs(points), (scale,) * 3, offset, lower, upper))
         rows.tofile(file)
-    return sorted(left)
+    return left
 
 
 def write_laz(path: Path, points: Points, gps_time_start: float = 0.0) -> list[str]:
@@ -180,6 +189,14 @@ def write_laz(path: Path, points: Points, gps_time_start: float = 0.0) -> list[s
         for piece in source.chunk_iterator(_LAZ_PIECE):
             target.write_points(piece)
     plain.unlink()
+    return left
+
+
+def write_copc(path: Path, points: Points, gps_time_start: float = 0.0) -> list[str]:
+    """LAZ 1.4, point format 6 or 7. Returns the names of scalars that it has no place for."""
+    readers.load("lazrs")
+    rows, scale, offset, left = _las_rows(points, copc.PLAIN if points.colors is None else copc.COLORED, gps_time_start)
+    copc.write(path, rows, scale, offset, _crs(points))
     return left
 
 
@@ -225,5 +242,5 @@ def _las_header(count: int, crs: bytes, scale: Sequence[float], offset: Sequence
     return head + struct.pack("<12d", *scale, *offset, *box) + record
 
 
-_WRITERS = {"ply": lambda path, points, _start: write_ply(path, points), "las": write_las, "laz": write_laz,
+_WRITERS = {"ply": lambda path, points, _start: write_ply(path, points), "las": write_las, "laz": write_laz, "copc.laz": write_copc,
             "e57": lambda path, points, _start: write_e57(path, points)}

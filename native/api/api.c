@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Devices, frames and progress as callers see them: check, delegate. The other exported functions stand with what they
-// concern: scene/cloud.c, scene/scene.c, io/file.c, task.c, error.c, log.c.
+// concern: scene/clouds/cloud.c, scene/scene.c, io/file.c, task.c, error.c, log.c.
 #include "run/execute.h"
 #include "run/frame_samples.h"
-#include "scene/paged.h"
+#include "scene/clouds/paged.h"
 #include "base/descriptor.h"
 #include "base/progress.h"
-#include "base/version.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-const char *patina_version(void) { return pt_version; }
 
 static int fail(const char *what) { return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s", what); }
 
@@ -181,6 +178,16 @@ int patina_frame_render(patina_frame *frame, const patina_scene *scene)
         return fail("patina_frame_render: frame or scene is NULL");
     int error = begin_turn(frame, scene, 1);
     return error ? error : end_turn(frame, scene, pt_frame_render(frame, scene));
+}
+
+int patina_frame_check(patina_frame *frame, const patina_scene *scene)
+{
+    if (!frame || !scene)
+        return fail("patina_frame_check: frame or scene is NULL");
+    enter_clouds(scene, 1);
+    const int error = pt_frame_check(frame, scene);
+    leave_clouds(scene);
+    return error;
 }
 
 int patina_frame_refine(patina_frame *frame, const patina_scene *scene, double ms)

@@ -215,12 +215,13 @@ int patina_panorama_camera(const patina_panorama *panorama, uint32_t face, patin
         return code;
     if (face >= 6 || !camera || !size)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_panorama_camera: face %u of 6, or camera or size is NULL", face);
-    patina_camera found = {.left = -1 - GUARD,
-                           .right = 1 + GUARD,
-                           .bottom = -1 - GUARD,
-                           .top = 1 + GUARD,
-                           .near_clip = p.near_clip / (1.7320508 * (1 + GUARD)), // a corner is so much farther
-                           .far_clip = p.far_clip};
+    patina_camera found;
+    memset(&found, 0, sizeof found); // its padding too, which is copied
+    found.left = found.bottom = -1 - GUARD;
+    found.right = found.top = 1 + GUARD;
+    found.near_clip = p.near_clip / (1.7320508 * (1 + GUARD)); // a corner is so much farther
+    found.far_clip = p.far_clip;
+    found.panorama_face = 1;
     for (int row = 0; row < 3; row++) {
         const double *from = p.world_from_camera + 4 * row;
         double *to = found.world_from_camera + 4 * row;

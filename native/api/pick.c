@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Picking: which points of an instance an outline on the picture holds, and pixels that show selected ones. Decided in float64, point
-// by point, in chunks that may have any; a row of pixels knows which edges of the outline cross it.
-#include "scene/paged.h"
+// Picking: which points of an instance an outline on the picture holds, which of them is the nearest to a place, and pixels that show
+// selected ones. Decided in float64, point by point, in chunks that may have any; a row of pixels knows which edges of the outline
+// cross it.
+#include "scene/clouds/paged.h"
 #include "run/frame.h"
 #include "base/descriptor.h"
 #include "base/progress.h"
@@ -25,6 +26,13 @@ struct outline {
     double lower[2], upper[2];
 };
 
+// A point, and the square of its distance from a place in the image; found 0: none.
+struct nearest {
+    uint64_t number;
+    double position[3], squared;
+    int found;
+};
+
 struct pick {
     const struct patina_scene *scene;
     const struct pt_instance *instance; // of a cloud in parts the part at hand
@@ -39,7 +47,10 @@ struct pick {
     const uint64_t *keys;                // of the frame, or NULL
     uint32_t region[4];
     int by_class;
-    uint8_t *bits;
+    uint8_t *bits;       // or NULL: only the nearest point to `place` is wanted
+    const double *place; // pixels
+    struct nearest nearest;
+    struct pt_mutex lock; // of `nearest`
     struct patina_progress *progress;
     _Atomic uint32_t done; // chunks
 };
@@ -108,7 +119,7 @@ static int in_outline(const struct outline *outline, double x, double y)
 
 // ---- points --------------------------------------------------------------------------------------------------------------
 
-// Of a divided chunk: whether clips, classes, shapes and mask leave the point at `slot`, in the world at p.
+// Of a divided chunk: whether clips, classes, shapes, mask and field leave the point at `slot`, in the world at p.
 static int is_drawn(const struct pick *pick, const struct pt_division *division, uint64_t slot, const double p[3])
 {
     const struct patina_cloud *cloud = pick->instance->cloud;
@@ -116,6 +127,8 @@ static int is_drawn(const struct pick *pick, const struct pt_division *division,
     if (division->by_mask && pick->sieve.mask->words[slot / PT_SLOTS_A_WORD] >> slot % PT_SLOTS_A_WORD & 1u)
         return 0;
     if (division->by_class && pick->instance->style.hidden_classes[cloud->classes[slot] / 32] >> cloud->classes[slot] % 32 & 1u)
+        return 0;
+    if (division->by_field && pick->sieve.field->steps[slot] > pick->sieve.threshold)
         return 0;
     const uint32_t sight = division->by_shape ? cloud->shapes[slot] >> PT_SHAPE_SIGHT_SHIFT & 255u : 0;
     if (division->by_shape && pick->sieve.hidden_shapes[sight / 32] >> sight % 32 & 1u)
@@ -231,11 +244,31 @@ static void set_bit(uint8_t *bits, uint64_t index) // from several threads
     __atomic_fetch_or(&bits[index / 8], (uint8_t)(1u << index % 8), __ATOMIC_RELAXED);
 }
 
-static void pick_chunk(const struct pick *pick, const struct pt_chunk *chunk, const struct pt_division *division)
+// Replaces `kept` by a nearer point, or by one as near with a smaller number: whatever the order in which threads find them.
+static void keep_nearer(struct nearest *kept, const struct nearest *other)
+{
+    if (other->found &&
+        (!kept->found || other->squared < kept->squared || (other->squared == kept->squared && other->number < kept->number)))
+        *kept = *other;
+}
+
+// Of a point of a chunk, p from its origin, that falls on a place in the image.
+static struct nearest near_to(const struct pick *pick, const struct pt_chunk *chunk, uint64_t number, const double p[3],
+                              const double place[3])
+{
+    const double x = place[0] - pick->place[0], y = place[1] - pick->place[1];
+    return (struct nearest){.number = number,
+                            .position = {chunk->origin[0] + p[0], chunk->origin[1] + p[1], chunk->origin[2] + p[2]},
+                            .squared = x * x + y * y,
+                            .found = 1};
+}
+
+static void pick_chunk(struct pick *pick, const struct pt_chunk *chunk, const struct pt_division *division)
 {
     const struct patina_cloud *cloud = pick->instance->cloud;
     float unpacked[3 * PT_CHUNK_POINTS];
     double world[3], offset[3];
+    struct nearest nearest = {0};
     chunk_offset(pick, chunk, world, offset);
     if (pick->outline.count && !may_have(pick, chunk, offset))
         return;
@@ -244,7 +277,7 @@ static void pick_chunk(const struct pick *pick, const struct pt_chunk *chunk, co
         const double p[3] = {(double)positions[i], (double)positions[chunk->padded + i],
                              (double)positions[2 * (size_t)chunk->padded + i]};
         const uint64_t slot = (uint64_t)chunk->first + i;
-        double v[3], place[3];
+        double v[3], place[3] = {0};
         if (pick->by_class && !of_class(pick, slot))
             continue;
         if (pick->outline.count) {
@@ -262,7 +295,17 @@ static void pick_chunk(const struct pick *pick, const struct pt_chunk *chunk, co
             if (!is_drawn(pick, division, slot, v))
                 continue;
         }
-        set_bit(pick->bits, pt_number_of(cloud, slot));
+        if (pick->bits) {
+            set_bit(pick->bits, pt_number_of(cloud, slot));
+        } else {
+            const struct nearest found = near_to(pick, chunk, pt_number_of(cloud, slot), p, place);
+            keep_nearer(&nearest, &found);
+        }
+    }
+    if (nearest.found) {
+        pt_mutex_lock(&pick->lock);
+        keep_nearer(&pick->nearest, &nearest);
+        pt_mutex_unlock(&pick->lock);
     }
 }
 
@@ -286,24 +329,24 @@ static void pick_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 // ---- what is exported ----------------------------------------------------------------------------------------------------
 
-static int check(const patina_scene *scene, const patina_pick *desc, const uint8_t *bits, size_t size)
+static uint64_t points_of(const patina_scene *scene, uint32_t instance)
 {
-    if (!bits || desc->instance >= scene->given)
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: bits is NULL, or no such instance");
     uint32_t first;
-    pt_scene_parts(scene, desc->instance, &first);
-    const uint64_t count = scene->instances[first].cloud->info.count;
-    if (size != (count + 7) / 8)
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: %zu bytes for %llu points", size,
-                       (unsigned long long)count);
+    pt_scene_parts(scene, instance, &first);
+    return scene->instances[first].cloud->info.count;
+}
+
+static int check(const patina_scene *scene, const char *call, const patina_pick *desc)
+{
+    if (desc->instance >= scene->given)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "%s: the scene has no instance %u", call, desc->instance);
     if (desc->corners > MOST_CORNERS || (desc->corners && (desc->corners < 3 || !desc->polygon)))
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: %u corners; 3 to %d", desc->corners,
-                       MOST_CORNERS);
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "%s: %u corners; 3 to %d", call, desc->corners, MOST_CORNERS);
     for (uint32_t i = 0; i < 2 * desc->corners; i++)
         if (!isfinite(desc->polygon[i]))
-            return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: a corner is not finite");
+            return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "%s: a corner is not finite", call);
     if (desc->corners && !scene->has_camera)
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: the scene has no camera");
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "%s: the scene has no camera", call);
     return PATINA_OK;
 }
 
@@ -356,35 +399,73 @@ static int run(struct pick *pick, const struct patina_frame *frame, struct pt_in
     return error;
 }
 
-int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, const patina_pick *given, patina_progress *progress,
-                      uint8_t *bits, size_t size)
+// pick: has bits, which are all 0, or a place; desc, which was checked.
+static int pick_points(struct pick *pick, const patina_scene *scene, const patina_frame *frame)
 {
-    patina_pick taken;
-    const patina_pick *const desc = &taken;
-    if (!scene || !given)
-        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT,
-                       "patina_scene_pick: scene or what to pick is NULL");
-    int error = pt_take(&scene->handle, "patina_scene_pick", given, &taken, sizeof taken);
-    error = error ? error : check(scene, desc, bits, size);
-    if (error)
-        return error;
-    struct pick pick = {.scene = scene, .desc = desc, .bits = bits, .progress = progress};
     uint32_t first;
-    pick.parts = pt_scene_parts(scene, desc->instance, &first);
-    pick.instance = &scene->instances[first];
+    pick->scene = scene;
+    pick->parts = pt_scene_parts(scene, pick->desc->instance, &first);
+    pick->instance = &scene->instances[first];
     for (int k = 0; k < 8; k++)
-        pick.by_class |= desc->classes[k] != 0;
-    memset(bits, 0, size);
-    if (pick.by_class && !pick.instance->cloud->classes) // of such points none has a class
+        pick->by_class |= pick->desc->classes[k] != 0;
+    if (pick->by_class && !pick->instance->cloud->classes) // of such points none has a class
         return PATINA_OK;
     struct pt_inverse_clip *room = malloc((scene->clip_count + 1) * sizeof *room);
-    set_views(&pick);
-    error = room ? run(&pick, frame, room) : PATINA_ERROR_MEMORY;
+    set_views(pick);
+    pt_mutex_init(&pick->lock);
+    const int error = room ? run(pick, frame, room) : PATINA_ERROR_MEMORY;
+    pt_mutex_destroy(&pick->lock);
     free(room);
     return error == PATINA_ERROR_MEMORY      ? pt_fail(&scene->handle, error, "picking points: out of memory")
            : error == PATINA_ERROR_CANCELLED ? pt_fail(&scene->handle, error, "picking points was cancelled")
            : error                           ? pt_fail_again(&scene->handle, error)
                                              : PATINA_OK;
+}
+
+int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, const patina_pick *given, patina_progress *progress,
+                      uint8_t *bits, size_t size)
+{
+    patina_pick desc;
+    if (!scene || !given)
+        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT,
+                       "patina_scene_pick: scene or what to pick is NULL");
+    int error = pt_take(&scene->handle, "patina_scene_pick", given, &desc, sizeof desc);
+    error = error ? error : check(scene, "patina_scene_pick", &desc);
+    if (error)
+        return error;
+    const uint64_t count = points_of(scene, desc.instance);
+    if (!bits || size != (count + 7) / 8)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: bits is NULL, or %zu bytes for %llu points",
+                       size, (unsigned long long)count);
+    memset(bits, 0, size);
+    struct pick pick = {.desc = &desc, .bits = bits, .progress = progress};
+    return pick_points(&pick, scene, frame);
+}
+
+int patina_scene_pick_nearest(const patina_scene *scene, const patina_frame *frame, const patina_pick *given,
+                              const double place[2], patina_progress *progress, patina_picked *picked)
+{
+    static const char call[] = "patina_scene_pick_nearest";
+    patina_pick desc;
+    if (!scene || !given)
+        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "%s: scene or what to pick is NULL", call);
+    int error = pt_take(&scene->handle, call, given, &desc, sizeof desc);
+    error = error ? error : check(scene, call, &desc);
+    if (error)
+        return error;
+    if (!desc.corners || !place || !isfinite(place[0]) || !isfinite(place[1]))
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "%s: no polygon, or the place is NULL or not finite", call);
+    struct pick pick = {.desc = &desc, .place = place, .progress = progress};
+    error = pick_points(&pick, scene, frame);
+    if (error)
+        return error;
+    const struct nearest *found = &pick.nearest;
+    const patina_picked told = {.struct_size = sizeof told,
+                                .found = (uint32_t)found->found,
+                                .number = found->number,
+                                .position = {found->position[0], found->position[1], found->position[2]},
+                                .distance = sqrt(found->squared)};
+    return pt_give(&scene->handle, call, &told, sizeof told, picked);
 }
 
 // Whether the mask of the instance that an id is of selects it. instance: of the id before.

@@ -3,8 +3,8 @@
 #include "base/descriptor.h"
 #include "base/error.h"
 #include "base/words.h"
-#include "scene/analysis.h"
-#include "scene/fingerprint.h"
+#include "scene/analysis/analysis.h"
+#include "scene/clouds/fingerprint.h"
 
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -38,6 +38,15 @@ struct patina_task {
     struct pt_analysis analysis; // computed, until it is applied
     patina_grid_desc grid;
     float *normals;
+    patina_distance_desc distance;
+    patina_ground_desc ground;
+    float *distances, *intervals, *heights;
+    uint8_t *grounds;
+    double offset[3];
+    const uint8_t *hidden;
+    size_t hidden_size;
+    uint64_t room, *count;
+    float *positions, *colors, *scalars;
 };
 
 static void thread_main(void *argument)
@@ -104,6 +113,17 @@ static int add_to_build(struct patina_task *task) { return patina_builder_add(ta
 
 static int verify(struct patina_task *task) { return patina_cloud_verify(task->path, task->progress); }
 
+static int thin(struct patina_task *task)
+{
+    patina_cloud *cloud = NULL;
+    int error = patina_cloud_open_at(task->path, task->offset, &cloud);
+    if (!error)
+        error = patina_cloud_thin(cloud, task->hidden, task->hidden_size, task->room, task->positions, task->colors,
+                                  task->normals, task->scalars, task->count);
+    patina_cloud_destroy(cloud);
+    return error;
+}
+
 static int analyse(struct patina_task *task)
 {
     return pt_analysis_compute(task->painted, &task->analyse, NULL, task->progress, &task->analysis);
@@ -117,6 +137,16 @@ static int analyse_file(struct patina_task *task)
 static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&task->desc, task->fingerprint); }
 
 static int grid_normals(struct patina_task *task) { return patina_grid_normals(&task->grid, task->progress, task->normals); }
+
+static int cloud_distance(struct patina_task *task)
+{
+    return patina_cloud_distance(&task->distance, task->progress, task->distances, task->intervals);
+}
+
+static int ground(struct patina_task *task)
+{
+    return patina_ground(&task->ground, task->progress, task->heights, task->grounds);
+}
 
 int patina_task_render(patina_frame *frame, const patina_scene *scene, const patina_read *reads, uint32_t count,
                        patina_task **out)
@@ -205,6 +235,26 @@ int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *prog
     return error ? error : start(&task, out);
 }
 
+int patina_task_cloud_distance(const patina_distance_desc *desc, patina_progress *progress, float *distance, float *interval,
+                               patina_task **out)
+{
+    struct patina_task task = {.work = cloud_distance, .progress = progress, .distances = distance, .intervals = interval};
+    if (!desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_cloud_distance: desc is NULL");
+    const int error = pt_take(NULL, "patina_task_cloud_distance", desc, &task.distance, sizeof task.distance);
+    return error ? error : start(&task, out);
+}
+
+int patina_task_ground(const patina_ground_desc *desc, patina_progress *progress, float *height, uint8_t *is_ground,
+                       patina_task **out)
+{
+    struct patina_task task = {.work = ground, .progress = progress, .heights = height, .grounds = is_ground};
+    if (!desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_ground: desc is NULL");
+    const int error = pt_take(NULL, "patina_task_ground", desc, &task.ground, sizeof task.ground);
+    return error ? error : start(&task, out);
+}
+
 // Starts a task that has a path.
 static int start_at(struct patina_task *task, const char *path, patina_task **out)
 {
@@ -267,6 +317,20 @@ int patina_task_analyse_file(const char *from, const patina_analysis_desc *desc,
 int patina_task_verify(const char *path, patina_progress *progress, patina_task **out)
 {
     return start_at(&(struct patina_task){.work = verify, .progress = progress}, path, out);
+}
+
+int patina_task_thin(const char *path, const double *offset, const uint8_t *hidden, size_t size, uint64_t room,
+                     float *positions, float *colors, float *normals, float *scalars, uint64_t *count, patina_task **out)
+{
+    if (!offset || !count || (room && !positions))
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_thin: offset, positions or count is NULL");
+    struct patina_task task = {.work = thin, .hidden = hidden, .hidden_size = size, .room = room, .count = count};
+    memcpy(task.offset, offset, sizeof task.offset);
+    task.positions = positions;
+    task.colors = colors;
+    task.normals = normals;
+    task.scalars = scalars;
+    return start_at(&task, path, out);
 }
 
 int patina_task_take_file(patina_task *task, patina_file **out)

@@ -75,7 +75,7 @@ enum pt_vectors { PT_VECTORS_NONE, PT_VECTORS_SSE42, PT_VECTORS_AVX2, PT_VECTORS
 enum pt_vectors pt_processor_vectors(void);
 void pt_processor_name(char *text, size_t size); // as its maker calls it; "processor" where that is not known
 uint64_t pt_peak_memory(void);                   // most bytes that this process ever held; 0: not known
-uint64_t pt_free_memory(void);                   // bytes that programs may yet take; 0: not known
+uint64_t pt_free_memory(void);                   // bytes that this process may yet take; 0: not known
 uint64_t pt_file_memory(void); // bytes of mapped files that this process holds at the moment, or of all; 0: not known
 const char *pt_error_text(int error, char *buffer, size_t size); // buffer: where the text may lie
 

@@ -6,6 +6,7 @@
 #include <sched.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 uint32_t pt_core_count(void)
@@ -87,10 +88,23 @@ static uint64_t left_of_group(void)
     return most > used ? most - used : 1; // 0 would say that nobody knows
 }
 
+// A third of the addresses that the process may yet have (ulimit -v): kernels and threads reserve many that they never write.
+static uint64_t left_of_addresses(void)
+{
+    struct rlimit limit;
+    const uint64_t page = (uint64_t)sysconf(_SC_PAGESIZE), used = number_in("/proc/self/statm", "");
+    if (getrlimit(RLIMIT_AS, &limit) || limit.rlim_cur == RLIM_INFINITY || used == UINT64_MAX)
+        return UINT64_MAX;
+    return limit.rlim_cur > used * page + 3 ? (limit.rlim_cur - used * page) / 3 : 1;
+}
+
 uint64_t pt_free_memory(void)
 {
-    const uint64_t kib = number_in("/proc/meminfo", "MemAvailable:"), left = left_of_group();
-    const uint64_t all = kib == UINT64_MAX ? UINT64_MAX : kib << 10, least = all < left ? all : left;
+    const uint64_t kib = number_in("/proc/meminfo", "MemAvailable:");
+    const uint64_t bounds[] = {kib == UINT64_MAX ? kib : kib << 10, left_of_group(), left_of_addresses()};
+    uint64_t least = UINT64_MAX;
+    for (size_t i = 0; i < sizeof bounds / sizeof *bounds; i++)
+        least = bounds[i] < least ? bounds[i] : least;
     return least == UINT64_MAX ? 0 : least;
 }
 

@@ -24,6 +24,13 @@ static inline bool pt_same_start(const char *a, const char *b, size_t length)
 
 static inline bool pt_same_word(const char *a, const char *b) { return pt_same_start(a, b, (size_t)-1); }
 
+// Whether the path is longer than the ending and ends with it.
+static inline bool pt_ends_in(const char *path, const char *ending)
+{
+    const size_t length = strlen(path), size = strlen(ending);
+    return length > size && !strcmp(path + length - size, ending);
+}
+
 // The caller frees it; NULL without memory.
 static inline char *pt_copy_text(const char *text, size_t length)
 {

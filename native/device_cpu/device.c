@@ -121,7 +121,8 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
     return error;
 }
 
-static int cpu_run_tail(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
+static int cpu_run_tail(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count,
+                        const atomic_int *cancel)
 {
     struct cpu_device *cpu = (struct cpu_device *)device;
     struct pt_cpu_pass *bound = malloc(count * sizeof *bound);
@@ -132,13 +133,14 @@ static int cpu_run_tail(struct patina_device *device, const struct pt_bound_pass
                                          .buffers = passes[i].buffers,
                                          .buffer_count = passes[i].buffer_count,
                                          .pool = cpu->base.pool,
+                                         .cancel = cancel,
                                          .scratch = cpu->scratch}};
     if (!error)
         error = cpu->isa->tail(bound, count);
     free(bound);
-    if (error)
+    if (error == PATINA_ERROR_MEMORY)
         return pt_fail(&device->handle, error, "%s: out of memory for rows of the picture", device->info.name);
-    return PATINA_OK;
+    return error;
 }
 
 static int cpu_wait(struct patina_device *device)

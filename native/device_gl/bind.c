@@ -29,6 +29,13 @@ void pt_gl_bound_forget(struct pt_gl_device *d)
     memset(d->texels_of, 0, sizeof d->texels_of);
 }
 
+int pt_gl_poll(struct pt_gl_device *d)
+{
+    if (d->look)
+        d->look(d->watched);
+    return d->cancel && atomic_load(d->cancel) ? pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled") : PATINA_OK;
+}
+
 int pt_gl_check_dispatch(struct pt_gl_device *d, const char *doing)
 {
     return d->base.info.hardware ? PATINA_OK : pt_gl_check(d, doing);
@@ -37,7 +44,7 @@ int pt_gl_check_dispatch(struct pt_gl_device *d, const char *doing)
 int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what)
 {
     if (size > d->block_size)
-        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
+        return pt_gl_fail(d, PATINA_ERROR_TOO_LARGE,
                           "%s: a buffer of %zu bytes; this OpenGL driver's shaders reach %zu at most", what, size,
                           d->block_size);
     size_t padded = size ? (size + 15) & ~(size_t)15 : 16; // as buffers are made
@@ -58,7 +65,7 @@ int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, si
 {
     const size_t texels = size / pt_gl_units[unit].bytes;
     if (texels > d->texels)
-        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
+        return pt_gl_fail(d, PATINA_ERROR_TOO_LARGE,
                           "a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most", texels, d->texels);
     struct pt_gl_bound *bound = &d->texels_of[unit];
     if (bound->name == name && bound->offset == offset && bound->size == size)
@@ -87,15 +94,32 @@ int pt_gl_is_part(const struct pt_gl_work *work, const struct pt_buffer_row *row
            ((const struct blend_args *)work->arguments)->part == PT_BLEND_COLORS; // else marks, or shadow words
 }
 
+static int is_texture(const struct pt_gl_device *d, const struct pt_buffer_row *row)
+{
+    return row->unit && !(row->soft && d->base.info.hardware);
+}
+
+static int is_block(const struct pt_gl_device *d, const struct pt_buffer_row *row)
+{
+    return row->binding && !(is_texture(d, row) && row->soft);
+}
+
+size_t pt_gl_most(const struct pt_gl_device *d, const struct pt_buffer_row *row)
+{
+    const size_t in_block = is_block(d, row) ? d->block_size : SIZE_MAX,
+                 in_texture = is_texture(d, row) ? d->texels * pt_gl_units[row->unit - 1u].bytes : SIZE_MAX;
+    return in_block < in_texture ? in_block : in_texture;
+}
+
 // In place of a block that is missing any other stands: the kernel does not touch it.
 static int bind_row(struct pt_gl_device *d, const struct pt_gl_work *work, const struct pt_buffer_row *row,
                     const struct pt_buffer *buffer)
 {
-    const int missing = !buffer || !buffer->name, texture = row->unit && !(row->soft && d->base.info.hardware);
+    const int missing = !buffer || !buffer->name, texture = is_texture(d, row);
     int result = PATINA_OK;
     if (row->uniform && !missing)
         d->gl.BindBufferRange(GL_UNIFORM_BUFFER, row->uniform, buffer->name, 0, (GLsizeiptr)buffer->size);
-    if (row->binding && !(texture && row->soft))
+    if (is_block(d, row))
         result = pt_gl_bind(d, row->binding, missing ? d->arguments : buffer->name, 0,
                             missing ? work->argument_size : buffer->size, pt_kernels[work->kernel].name);
     return result == PATINA_OK && texture && !missing ? pt_gl_bind_texture(d, row->unit - 1u, buffer) : result;
@@ -136,6 +160,9 @@ void pt_gl_tell_by_pixel(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y)
 {
+    const int polled = pt_gl_poll(d);
+    if (polled != PATINA_OK)
+        return polled;
     if (x && y) {
         pt_gl_tell_by_pixel(d, kernel, variant);
         pt_gl_use(d, d->programs[kernel][variant]);

@@ -13,6 +13,7 @@
 struct pt_gl_call {
     int (*run)(struct pt_gl_device *d, void *context);
     void *context;
+    const atomic_int *cancel;
     int cleanup; // runs on a lost context too
     int result, done;
     char message[512];
@@ -23,10 +24,11 @@ enum { STACK_SIZE = 16 << 20 }; // drivers compile shaders on our stack
 // ---- the thread ------------------------------------------------------------------------------------------------
 
 // Runs in the GL thread and returns its result and message. The caller's thread has no part in it but waiting.
-static int marshal(struct patina_device *device, int (*run)(struct pt_gl_device *, void *), void *context, int cleanup)
+static int marshal(struct patina_device *device, int (*run)(struct pt_gl_device *, void *), void *context,
+                   const atomic_int *cancel, int cleanup)
 {
     struct pt_gl_device *d = (struct pt_gl_device *)device;
-    struct pt_gl_call c = {.run = run, .context = context, .cleanup = cleanup};
+    struct pt_gl_call c = {.run = run, .context = context, .cancel = cancel, .cleanup = cleanup};
     pt_mutex_lock(&d->lock);
     while (d->call) // another thread's
         pt_condition_wait(&d->changed, &d->lock);
@@ -42,7 +44,13 @@ static int marshal(struct patina_device *device, int (*run)(struct pt_gl_device 
 
 static int call(struct patina_device *device, int (*run)(struct pt_gl_device *, void *), void *context)
 {
-    return marshal(device, run, context, 0);
+    return marshal(device, run, context, NULL, 0);
+}
+
+static int call_until(struct patina_device *device, int (*run)(struct pt_gl_device *, void *), void *context,
+                      const atomic_int *cancel)
+{
+    return marshal(device, run, context, cancel, 0);
 }
 
 static int close_context(struct pt_gl_device *d, void *unused)
@@ -87,6 +95,7 @@ static void thread_main(void *argument)
         pt_mutex_unlock(&d->lock);
 
         quit = c->run == close_context;
+        d->cancel = c->cancel;
         c->result = d->lost && !c->cleanup ? PATINA_ERROR_DEVICE : c->run(d, c->context);
         memcpy(c->message, d->message, sizeof c->message);
 
@@ -314,11 +323,10 @@ static int run_tail(struct pt_gl_device *d, void *context)
 struct groups_call {
     struct pt_group *groups;
     uint32_t count;
-    const atomic_int *cancel;
     _Atomic float *progress;
 };
 
-static int run_group(struct pt_gl_device *d, const struct pt_group *group, const atomic_int *cancel)
+static int run_group(struct pt_gl_device *d, const struct pt_group *group)
 {
     const struct pt_bound_pass *pass = group->passes;
     if (group->count > 1)
@@ -326,8 +334,7 @@ static int run_group(struct pt_gl_device *d, const struct pt_group *group, const
     return pt_gl_run(d, &(struct pt_gl_work){.kernel = pass->kernel,
                                              .arguments = pass->arguments,
                                              .argument_size = pass->argument_size,
-                                             .buffers = pass->buffers,
-                                             .cancel = cancel});
+                                             .buffers = pass->buffers});
 }
 
 // Names of `count` timer queries; 0: there are none. Software has done its work when a call returns: it needs no timer.
@@ -399,13 +406,13 @@ static int submit_groups(struct pt_gl_device *d, const struct groups_call *c, in
     for (uint32_t i = 0, timer = 0; i < c->count && result == PATINA_OK; i++) {
         struct pt_group *group = &c->groups[i];
         const struct pt_counts counts = d->counter.counts;
-        if (c->cancel && atomic_load(c->cancel))
-            return PATINA_ERROR_CANCELLED;
+        if ((result = pt_gl_poll(d)) != PATINA_OK)
+            return result;
         if (timed && !group->joined)
             d->gl.QueryCounter(d->queries[timer++], GL_TIMESTAMP);
         if (begins)
             begins[i] = d->counter.command_count;
-        result = run_group(d, group, c->cancel);
+        result = run_group(d, group);
         if (!timed && d->base.info.hardware && (i + 1 == c->count || !group[1].joined))
             d->gl.Finish();
         const double now = pt_milliseconds();
@@ -444,8 +451,8 @@ static int run_groups(struct pt_gl_device *d, void *context)
 static int op_run_groups(struct patina_device *device, struct pt_group *groups, uint32_t count, const atomic_int *cancel,
                          _Atomic float *progress)
 {
-    return call(device, run_groups,
-                &(struct groups_call){.groups = groups, .count = count, .cancel = cancel, .progress = progress});
+    return call_until(device, run_groups, &(struct groups_call){.groups = groups, .count = count, .progress = progress},
+                      cancel);
 }
 
 // ---- operations, called --------------------------------------------------------------------------------------------------
@@ -486,7 +493,7 @@ static int op_buffer_create(struct patina_device *device, size_t size, const voi
 static void op_buffer_destroy(struct patina_device *device, struct pt_buffer *buffer)
 {
     if (buffer->name)
-        marshal(device, destroy_buffer, &(struct buffer_call){.buffer = buffer}, 1);
+        marshal(device, destroy_buffer, &(struct buffer_call){.buffer = buffer}, NULL, 1);
     free(buffer->data);
     memset(buffer, 0, sizeof *buffer);
 }
@@ -516,10 +523,10 @@ static int op_run(struct patina_device *device, enum pt_kernel kernel, const voi
                   struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel)
 {
     (void)count; // as kernels.def lists them
-    return call(
+    return call_until(
         device, run_kernel,
-        &(struct pt_gl_work){
-            .kernel = kernel, .arguments = arguments, .argument_size = argument_size, .buffers = buffers, .cancel = cancel});
+        &(struct pt_gl_work){.kernel = kernel, .arguments = arguments, .argument_size = argument_size, .buffers = buffers},
+        cancel);
 }
 
 // What pt_gl_run_tail is made for; z comes from the keys, what else is extracted from planes that it does not make.
@@ -542,9 +549,16 @@ static uint32_t op_tail_length(const struct pt_bound_pass *passes, uint32_t coun
     return shades + TAIL;
 }
 
-static int op_run_tail(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
+static int op_run_tail(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count,
+                       const atomic_int *cancel)
 {
-    return call(device, run_tail, &(struct tail_call){.passes = passes, .count = count});
+    return call_until(device, run_tail, &(struct tail_call){.passes = passes, .count = count}, cancel);
+}
+
+// The limits were read when the device was opened: the GL thread is not asked.
+static uint64_t op_most(const struct patina_device *device, const struct pt_buffer_row *row)
+{
+    return pt_gl_most((const struct pt_gl_device *)device, row);
 }
 
 static void op_watch(struct patina_device *device, void (*look)(void *context), void *context)
@@ -570,7 +584,7 @@ static int op_counts(struct patina_device *device, struct pt_counts *out)
 static void op_destroy(struct patina_device *device)
 {
     struct pt_gl_device *d = (struct pt_gl_device *)device;
-    marshal(device, close_context, NULL, 1);
+    marshal(device, close_context, NULL, NULL, 1);
     pt_thread_join(&d->thread);
     pt_condition_destroy(&d->changed);
     pt_mutex_destroy(&d->lock);
@@ -592,6 +606,7 @@ static const struct pt_device_ops ops = {
     .tail_length = op_tail_length,
     .run_tail = op_run_tail,
     .run_groups = op_run_groups,
+    .most = op_most,
     .wait = op_wait,
     .watch = op_watch,
     .counts = op_counts,

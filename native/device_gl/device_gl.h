@@ -90,6 +90,7 @@ struct pt_gl_device {
     GladGLContext gl; // counts calls: count.c
     struct pt_gl_counter counter;
     void *context;
+    const atomic_int *cancel; // of the call at hand; NULL: nobody asks
     int lost;
     char message[512];
     size_t block_size;  // greatest storage block
@@ -160,10 +161,17 @@ struct pt_gl_work {
     const void *arguments;
     size_t argument_size;
     struct pt_buffer *const *buffers; // as kernels.def lists them
-    const atomic_int *cancel;
+};
+
+// What the arguments of kernels of the crop begin with, except of those that have a runner of their own.
+struct pt_gl_crop_args {
+    struct view_args view;
+    uint32_t crop_x, crop_y, crop_width, crop_height;
 };
 
 // bind.c: what runners share
+// Calls who watches, then polls cancel: PATINA_ERROR_CANCELLED where it is set. Each dispatch does so first.
+int pt_gl_poll(struct pt_gl_device *d);
 void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size); // bound at 0
 int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions);
 int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what);
@@ -172,6 +180,8 @@ int pt_gl_bind_buffers(struct pt_gl_device *d, const struct pt_gl_work *work);
 // Of the list's rows from `first` on those `count` that are no parts. buffers: from that of the first on.
 int pt_gl_bind_rows(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t first, uint32_t count,
                     struct pt_buffer *const *buffers);
+// The most bytes that a kernel may bind there as a whole.
+size_t pt_gl_most(const struct pt_gl_device *d, const struct pt_buffer_row *row);
 // Whether it is bound in parts, since clouds are larger than blocks and textures: what points have, of a kernel that walks them.
 int pt_gl_is_part(const struct pt_gl_work *work, const struct pt_buffer_row *row);
 int pt_gl_bind_texture(struct pt_gl_device *d, enum pt_unit unit, const struct pt_buffer *plane);

@@ -20,7 +20,6 @@ enum listing { FOUND = 0, WOKEN = 3, MARKED = 4, SELECTED = 6 };
 struct fill {
     struct pt_gl_device *d;
     const struct fill_args *args;
-    const atomic_int *cancel;
     uint32_t phase; // PT_FILL_*
     enum program find;
     int first; // the first of its steps looks everywhere
@@ -160,8 +159,6 @@ static int repeat(struct fill *f, int (*step)(struct fill *), uint32_t most)
     int result = PATINA_OK;
     f->first = 1;
     for (uint32_t i = 0; i < most && result == PATINA_OK; i++) {
-        if (f->cancel && atomic_load(f->cancel))
-            return pt_gl_fail(f->d, PATINA_ERROR_CANCELLED, "cancelled");
         result = step(f);
         f->first = 0;
         if (result == PATINA_OK &&
@@ -171,9 +168,9 @@ static int repeat(struct fill *f, int (*step)(struct fill *), uint32_t most)
     return result;
 }
 
-static int run_phase(struct pt_gl_device *d, const struct fill_args *args, uint32_t phase, const atomic_int *cancel)
+static int run_phase(struct pt_gl_device *d, const struct fill_args *args, uint32_t phase)
 {
-    struct fill f = {.d = d, .args = args, .phase = phase, .cancel = cancel, .find = FIND_EMPTY};
+    struct fill f = {.d = d, .args = args, .phase = phase, .find = FIND_EMPTY};
     if (phase == PT_FILL_OCCLUDED)
         f.find = args->view.level ? FIND_COARSE : FIND_OCCLUDED;
     int result = prepare(&f);
@@ -197,7 +194,7 @@ int pt_gl_fill(struct pt_gl_device *d, const struct pt_gl_work *work)
         if (result == PATINA_OK)
             result = pt_gl_bind_buffers(d, work);
         if (result == PATINA_OK)
-            result = run_phase(d, args, phase, work->cancel);
+            result = run_phase(d, args, phase);
     }
     return result;
 }

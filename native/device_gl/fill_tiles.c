@@ -19,7 +19,6 @@ struct state {
 struct closing {
     struct pt_gl_device *d;
     const struct fill_args *args;
-    const atomic_int *cancel;
     uint32_t phase; // PT_FILL_*
     uint32_t side;
     struct state whole, kept, now; // the pass's planes, before the phase, before the next dispatch
@@ -45,7 +44,7 @@ static int programs(const struct closing *c)
     for (uint32_t phase = PT_FILL_BACKGROUND; phase <= PT_FILL_OCCLUDED && result == PATINA_OK; phase++) {
         GLuint *program = &c->d->programs[PT_KERNEL_fill][PROGRAMS + phase - 1];
         char definitions[64];
-        snprintf(definitions, sizeof definitions, "#define PHASE %uu\n#define SIDE %uu\n", phase, c->side);
+        snprintf(definitions, sizeof definitions, "#define PHASE %u\n#define SIDE %uu\n", phase, c->side);
         if (!*program && c->args->phases & phase)
             result = pt_gl_program(c->d, "lib/fill_tiles.glsl", definitions, program);
     }
@@ -87,8 +86,6 @@ static int dispatch(struct closing *c, const struct state *to, uint32_t fills, u
 {
     const uint32_t *rect = c->args->view.rect, inner = c->side - 2 * guard;
     const uint32_t variant = PROGRAMS + c->phase - 1;
-    if (c->cancel && atomic_load(c->cancel))
-        return pt_gl_fail(c->d, PATINA_ERROR_CANCELLED, "cancelled");
     int result = bind(c, to);
     c->d->gl.ProgramUniform4ui(c->d->programs[PT_KERNEL_fill][variant], 0, fills, unfills, guard, 0);
     if (result == PATINA_OK)
@@ -154,7 +151,7 @@ static int run_phase(struct closing *c)
 int pt_gl_fill_tiles(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     const struct pt_buffer *keys = work->buffers[PT_BUF_fill_keys], *from = work->buffers[PT_BUF_fill_from];
-    struct closing c = {.d = d, .args = work->arguments, .cancel = work->cancel, .side = side_of(d)};
+    struct closing c = {.d = d, .args = work->arguments, .side = side_of(d)};
     c.whole = c.now = (struct state){keys->name, from->name, 0};
     int result = programs(&c);
     for (uint32_t i = 0; i < 2 && result == PATINA_OK; i++)

@@ -28,12 +28,6 @@ static int run_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t widt
 
 // ---- kernels with runners of their own: see the table below ------------------------------------------------------------
 
-static int run_focus(struct pt_gl_device *d, const struct pt_gl_work *work)
-{
-    const struct focus_args *args = work->arguments;
-    return run_over(d, PT_KERNEL_focus, 0, "", args->crop_width, args->crop_height);
-}
-
 static int run_extract(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     static const char *const definitions[] = {"#define PLANE 0\n", "#define PLANE 1\n", "#define PLANE 2\n",
@@ -98,7 +92,8 @@ static int run_peel(struct pt_gl_device *d, const struct pt_gl_work *work)
                     view->rect[3] - (view->rect[1] >> PT_TILE_LEVEL << PT_TILE_LEVEL));
 }
 
-// Pointwise kernels are pointwise.c's; the others have one dispatch, over their domain: tiles with points in them, or the rectangle.
+// Pointwise kernels are pointwise.c's. The others have one dispatch over their domain: tiles with points in them, the rectangle or the
+// crop.
 static pt_gl_runner *const runners[PT_KERNEL_COUNT] = {
     [PT_KERNEL_sift] = pt_gl_points,   [PT_KERNEL_scatter] = pt_gl_scatter,
     [PT_KERNEL_splat] = pt_gl_splat,   [PT_KERNEL_resolve] = run_resolve,
@@ -108,18 +103,21 @@ static pt_gl_runner *const runners[PT_KERNEL_COUNT] = {
     [PT_KERNEL_raster] = pt_gl_raster, [PT_KERNEL_shadow_test] = pt_gl_points,
     [PT_KERNEL_lines] = pt_gl_lines,   [PT_KERNEL_shade] = pt_gl_shade,
     [PT_KERNEL_obscure] = run_obscure, [PT_KERNEL_antialias] = pt_gl_antialias,
-    [PT_KERNEL_peel] = run_peel,       [PT_KERNEL_focus] = run_focus,
-    [PT_KERNEL_extract] = run_extract, [PT_KERNEL_ink] = run_ink,
-    [PT_KERNEL_gather] = pt_gl_gather, [PT_KERNEL_soft] = pt_gl_soft,
-    [PT_KERNEL_merge] = pt_gl_merge,   [PT_KERNEL_differ] = pt_gl_differ,
-    [PT_KERNEL_dim] = pt_gl_points,    [PT_KERNEL_rank] = pt_gl_points,
+    [PT_KERNEL_peel] = run_peel,       [PT_KERNEL_extract] = run_extract,
+    [PT_KERNEL_ink] = run_ink,         [PT_KERNEL_gather] = pt_gl_gather,
+    [PT_KERNEL_soft] = pt_gl_soft,     [PT_KERNEL_merge] = pt_gl_merge,
+    [PT_KERNEL_differ] = pt_gl_differ, [PT_KERNEL_dim] = pt_gl_points,
+    [PT_KERNEL_rank] = pt_gl_points,
 };
 
 static int run_once(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     const struct view_args *view = work->arguments;
+    const struct pt_gl_crop_args *crop = work->arguments;
     if (pt_gl_is_pointwise(work->kernel))
         return pt_gl_pointwise(d, work);
+    if (pt_kernels[work->kernel].domain == PT_DOMAIN_crop)
+        return run_over(d, work->kernel, 0, "", crop->crop_width, crop->crop_height);
     if (pt_kernels[work->kernel].domain == PT_DOMAIN_rectangle)
         return run_over(d, work->kernel, 0, "", view->rect[2] - view->rect[0], view->rect[3] - view->rect[1]);
     int result = pt_gl_kernel_program(d, work->kernel, 0, "");

@@ -36,6 +36,9 @@ int pt_gl_list_groups(struct pt_gl_device *d, uint32_t binding, uint32_t count, 
 int pt_gl_list_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head)
 {
     char doing[64];
+    const int polled = pt_gl_poll(d);
+    if (polled != PATINA_OK)
+        return polled;
     pt_gl_tell_by_pixel(d, kernel, variant);
     pt_gl_use(d, d->programs[kernel][variant]);
     d->gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, name);

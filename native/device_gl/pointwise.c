@@ -31,10 +31,7 @@ static int program(struct pt_gl_device *d, enum pt_kernel kernel)
 
 int pt_gl_pointwise(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
-    const struct { // what arguments of kernels of the crop begin with
-        struct view_args view;
-        uint32_t crop_x, crop_y, crop_width, crop_height;
-    } *crop = work->arguments;
+    const struct pt_gl_crop_args *crop = work->arguments;
     int result = program(d, work->kernel);
     if (result != PATINA_OK)
         return result;

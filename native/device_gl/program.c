@@ -185,6 +185,27 @@ static int compile(struct pt_gl_device *d, const struct source *s, GLuint *progr
     return pt_gl_check(d, "compiling a shader");
 }
 
+// For build/check_spirv: writes the text of a program that the driver took to the folder that PATINA_SHADER_DUMP names, once for each different text.
+static void dump(const struct source *s)
+{
+    const char *folder = getenv("PATINA_SHADER_DUMP");
+    char name[MAX_NAME], path[4096];
+    uint64_t sum = 0xCBF29CE484222325u; // FNV-1a
+    if (!folder || !*folder)
+        return;
+    for (size_t i = 0; i < s->length; i++)
+        sum = (sum ^ (unsigned char)s->text[i]) * 0x100000001B3u;
+    snprintf(name, sizeof name, "%s", s->body ? s->body : s->files[0]);
+    for (char *c = name; *c; c++)
+        *c = *c == '/' || *c == '.' ? '_' : *c;
+    const int length = snprintf(path, sizeof path, "%s/%s-%016llx.comp", folder, name, (unsigned long long)sum);
+    FILE *file = length > 0 && (size_t)length < sizeof path ? pt_stream_open(path, "wb") : NULL;
+    if (file) {
+        fwrite(s->text, 1, s->length, file);
+        fclose(file);
+    }
+}
+
 // The numbers of its storage blocks and textures.
 static const char *bindings_of(const char *name)
 {
@@ -208,6 +229,8 @@ int pt_gl_program_of_body(struct pt_gl_device *d, const char *name, const char *
     int result = add_file(d, &s, name, all);
     if (result == PATINA_OK)
         result = compile(d, &s, program);
+    if (result == PATINA_OK)
+        dump(&s);
     free(s.text);
     return result;
 }

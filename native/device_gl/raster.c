@@ -18,8 +18,6 @@ int pt_gl_raster(struct pt_gl_device *d, const struct pt_gl_work *work)
     for (uint32_t pass = 0; pass < 2 && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_raster, pass, definitions[pass]);
         for (uint32_t done = 0; done < groups && result == PATINA_OK; done += LONG_RUN) {
-            if (work->cancel && atomic_load(work->cancel))
-                return pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled");
             d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_raster][pass], 0, done * GROUP);
             result = pt_gl_dispatch(d, PT_KERNEL_raster, pass, groups - done < LONG_RUN ? groups - done : LONG_RUN,
                                     d->base.info.hardware ? SLICES : 1);

@@ -160,8 +160,6 @@ static int run_pass(struct pt_gl_device *d, const struct instance_buffers *b, co
     int result = PATINA_OK;
     for (uint32_t done = 0; done < part->chunk_count && result == PATINA_OK; done += run) {
         uint32_t groups = part->chunk_count - done < run ? part->chunk_count - done : run;
-        if (b->work->cancel && atomic_load(b->work->cancel))
-            return pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled");
         if (b->parts && (result = begin_large(d, b)) != PATINA_OK)
             break;
         d->gl.ProgramUniform1ui(d->programs[b->work->kernel][pass], 0, part->first_chunk + done);

@@ -8,7 +8,6 @@ struct pt_embedded_shader {
 };
 
 extern const struct pt_embedded_shader pt_embedded_shaders[]; // ends with {NULL, NULL}
-extern const unsigned pt_embedded_shader_count;
 
 // BIND_* and UNIT_* of each program, by build/generate_kernels of kernels.def; ends with {NULL, NULL}.
 extern const struct pt_embedded_shader pt_shader_bindings[];

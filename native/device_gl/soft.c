@@ -98,24 +98,19 @@ static uint32_t longest(const struct soft *soft, uint32_t first, uint32_t end)
     return most;
 }
 
-static int set_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t variant, uint32_t first, uint32_t end,
-                     uint32_t part)
+static void set_tiles(struct pt_gl_device *d, uint32_t variant, uint32_t first, uint32_t end, uint32_t part)
 {
     const GLuint program = d->programs[PT_KERNEL_soft][variant];
-    if (soft->work->cancel && atomic_load(soft->work->cancel))
-        return pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled");
     d->gl.ProgramUniform1ui(program, 0, first);
     d->gl.ProgramUniform1ui(program, 1, end);
     d->gl.ProgramUniform1ui(program, 3, part);
-    return PATINA_OK;
 }
 
 // A workgroup for each of these tiles.
-static int run_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t variant, uint32_t first, uint32_t end,
-                     uint32_t part)
+static int run_tiles(struct pt_gl_device *d, uint32_t variant, uint32_t first, uint32_t end, uint32_t part)
 {
-    const int result = set_tiles(d, soft, variant, first, end, part);
-    return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_soft, variant, end - first, 1) : result;
+    set_tiles(d, variant, first, end, part);
+    return pt_gl_dispatch(d, PT_KERNEL_soft, variant, end - first, 1);
 }
 
 static int sort_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end)
@@ -125,11 +120,11 @@ static int sort_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t 
     if (most < 2)
         return result;
     if (most <= SORTED_AT_ONCE)
-        return run_tiles(d, soft, SORT, first, end, 0);
+        return run_tiles(d, SORT, first, end, 0);
     for (uint64_t run = 2; run < 2 * (uint64_t)most && result == PATINA_OK; run *= 2)
         for (uint64_t apart = run / 2; apart && result == PATINA_OK; apart /= 2) {
             d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_soft][SORT], 4, (GLuint)apart);
-            result = run_tiles(d, soft, SORT, first, end, (uint32_t)run);
+            result = run_tiles(d, SORT, first, end, (uint32_t)run);
         }
     return result;
 }
@@ -152,13 +147,11 @@ static uint64_t most_parts(const struct soft *soft, uint64_t most)
 static int draw_part(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end, uint32_t part)
 {
     const GLuint lists = d->scratch[PT_GL_SCRATCH_COUNTERS].name;
-    int result = set_tiles(d, soft, soft->draw, first, end, part);
+    set_tiles(d, soft->draw, first, end, part);
     pt_gl_zero(d, lists, part % 2 * LIST, PT_GL_LIST_HEAD);
-    if (result != PATINA_OK)
-        return result;
     if (!part)
         return pt_gl_dispatch(d, PT_KERNEL_soft, soft->draw, end - first, 1);
-    result = pt_gl_list_groups(d, PT_BIND_soft_unfinished, 2, LIST, 1, 1);
+    const int result = pt_gl_list_groups(d, PT_BIND_soft_unfinished, 2, LIST, 1, 1);
     return result == PATINA_OK ? pt_gl_list_dispatch(d, PT_KERNEL_soft, soft->draw, lists, (part + 1) % 2 * LIST) : result;
 }
 

@@ -6,6 +6,8 @@
 #include <string.h>
 
 enum { TILE = 8, GROUP = 32, LISTS = 2 }; // as in lib/tiles.glsl
+// Workgroups between two looks at cancel: 1M pixels. Two cores shade as many in 50 ms.
+enum { LONG_RUN = 4096 };
 
 void pt_gl_tiles_forget(struct pt_gl_device *d)
 {
@@ -100,7 +102,20 @@ int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 int pt_gl_dispatch_tile_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, GLuint name, size_t head,
                              size_t most)
 {
-    const int result = pt_gl_bind(d, PT_BIND_tile_list, name, head, PT_GL_LIST_HEAD + 4 * most, "tiles");
-    d->gl.ProgramUniform1ui(d->programs[kernel][variant], 15, d->tiles.columns);
-    return result == PATINA_OK ? pt_gl_list_dispatch(d, kernel, variant, name, head) : result;
+    enum { TILES_EACH = GROUP / TILE };
+    const GLuint program = d->programs[kernel][variant];
+    uint32_t words[PT_GL_LIST_HEAD / 4];
+    int result = pt_gl_bind(d, PT_BIND_tile_list, name, head, PT_GL_LIST_HEAD + 4 * most, "tiles");
+    d->gl.ProgramUniform1ui(program, 15, d->tiles.columns);
+    if (result == PATINA_OK && most <= LONG_RUN * TILES_EACH)
+        return pt_gl_list_dispatch(d, kernel, variant, name, head);
+    if (result == PATINA_OK)
+        result = pt_gl_read(d, name, head, sizeof words, words); // software has done its work: this does not wait
+    const uint32_t groups = result == PATINA_OK ? (words[3] + TILES_EACH - 1) / TILES_EACH : 0;
+    for (uint32_t first = 0; first < groups && result == PATINA_OK; first += LONG_RUN) {
+        d->gl.ProgramUniform1ui(program, 13, first);
+        result = pt_gl_dispatch(d, kernel, variant, groups - first < LONG_RUN ? groups - first : LONG_RUN, 1);
+    }
+    d->gl.ProgramUniform1ui(program, 13, 0);
+    return result;
 }

@@ -182,13 +182,6 @@ bool pt_cells_says_empty(const char *word)
 
 // ---- which parting ---------------------------------------------------------------------------------------------------------
 
-static const uint8_t *line_end(const uint8_t *at, const uint8_t *end)
-{
-    while (at < end && !pt_is_line_end(*at))
-        at++;
-    return at;
-}
-
 // The next line that holds something and is no comment, behind its first blanks; `end` where there is none.
 static const uint8_t *next_line(enum pt_parting parting, const uint8_t *at, const uint8_t *end)
 {
@@ -197,7 +190,7 @@ static const uint8_t *next_line(enum pt_parting parting, const uint8_t *at, cons
             at++;
         if (!pt_is_comment(at, end))
             return at;
-        at = line_end(at, end);
+        at = pt_line_end(at, end);
     }
 }
 
@@ -245,7 +238,7 @@ static bool has_decimal_commas(const uint8_t *at, const uint8_t *end)
     struct pt_cells cells = {.parting = PT_PARTED_BY_BLANKS};
     uint32_t wanted = 0, lines = 0;
     at = next_line(cells.parting, at, end);
-    for (; at < end && lines < LOOKED_AT; at = next_line(cells.parting, line_end(at, end), end), lines++) {
+    for (; at < end && lines < LOOKED_AT; at = next_line(cells.parting, pt_line_end(at, end), end), lines++) {
         struct pt_line line;
         double values[1];
         uint32_t words = 0;

@@ -57,17 +57,10 @@ static bool is(struct word word, const char *text)
     return word.length == strlen(text) && !memcmp(word.text, text, word.length);
 }
 
-static const uint8_t *end_of_line(const uint8_t *at, const uint8_t *end)
-{
-    while (at < end && !pt_is_line_end(*at))
-        at++;
-    return at;
-}
-
 // Comes behind the line's end.
 static void skip_line(struct conf *c)
 {
-    c->at = end_of_line(c->at, c->end);
+    c->at = pt_line_end(c->at, c->end);
     if (c->at < c->end)
         c->at += c->at + 1 < c->end && c->at[0] == '\r' && c->at[1] == '\n' ? 2 : 1;
     c->line++;
@@ -83,7 +76,7 @@ bool pt_conf_is(const struct pt_input *input)
             at++;
         if (at == end || *at != '#')
             break;
-        at = end_of_line(at, end);
+        at = pt_line_end(at, end);
     }
     const struct word word = next_word(&at, end);
     return at < end && (is(word, "camera") || is(word, "bmesh") || is(word, "mesh"));
@@ -94,7 +87,7 @@ static void count_lines(struct conf *c)
     const uint8_t *at = c->at;
     while (at < c->end) {
         c->lines += is(next_word(&at, c->end), "bmesh");
-        at = end_of_line(at, c->end);
+        at = pt_line_end(at, c->end);
         at += at < c->end;
     }
 }
@@ -231,7 +224,7 @@ static int open_part(const struct conf *c, struct word name, struct part *part)
 // A line behind "bmesh".
 static int read_scan(struct conf *c, const uint8_t *at)
 {
-    const uint8_t *end = end_of_line(at, c->end);
+    const uint8_t *end = pt_line_end(at, c->end);
     const struct word name = next_word(&at, end);
     struct part part = {0};
     double values[NUMBERS];

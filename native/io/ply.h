@@ -155,4 +155,6 @@ bool ply_is_splat_rest(const char *name);
 // PATINA_ERROR_MEMORY without words.
 int ply_make_discs(struct patina_file *file, const char *name);
 
+static inline bool pt_is_float(uint32_t type) { return type == PATINA_FLOAT32 || type == PATINA_FLOAT64; }
+
 #endif

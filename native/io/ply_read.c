@@ -78,8 +78,6 @@ static bool find_family(const struct plan *plan, const char *const families[][FA
     return false;
 }
 
-static bool is_float(uint32_t type) { return type == PATINA_FLOAT32 || type == PATINA_FLOAT64; }
-
 // ---- columns -------------------------------------------------------------------------------------------------------
 
 static void aim(struct plan *plan, int64_t property, void *data, uint32_t type, uint32_t step)
@@ -139,7 +137,7 @@ static int plan_normals(struct plan *plan)
 
 static uint32_t color_class(uint32_t type)
 {
-    return is_float(type) ? PATINA_FLOAT32 : type == PATINA_UINT16 ? PATINA_UINT16 : PATINA_UINT8;
+    return pt_is_float(type) ? PATINA_FLOAT32 : type == PATINA_UINT16 ? PATINA_UINT16 : PATINA_UINT8;
 }
 
 static double color_maximum(uint32_t color_type)

@@ -21,8 +21,6 @@ struct writer {
     FILE *stream;
 };
 
-static bool is_float(uint32_t type) { return type == PATINA_FLOAT32 || type == PATINA_FLOAT64; }
-
 // One optional array of the descriptor.
 static int check_array(const patina_array *array, uint64_t count, bool types_fit, bool components_fit, const char *name)
 {
@@ -47,9 +45,9 @@ static int check_desc(const patina_cloud_desc *desc)
     for (int axis = 0; axis < 3; axis++)
         if (!isfinite(desc->origin[axis]))
             return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: the origin is not finite");
-    int code = p->data ? check_array(p, desc->count, is_float(p->type), p->components == 3, "positions") : PATINA_OK;
+    int code = p->data ? check_array(p, desc->count, pt_is_float(p->type), p->components == 3, "positions") : PATINA_OK;
     if (!code && n->data)
-        code = check_array(n, desc->count, is_float(n->type), n->components == 3, "normals");
+        code = check_array(n, desc->count, pt_is_float(n->type), n->components == 3, "normals");
     bool color_type = c->type == PATINA_UINT8 || c->type == PATINA_UINT16 || c->type == PATINA_FLOAT32;
     if (!code && c->data)
         code = check_array(c, desc->count, color_type, c->components == 3 || c->components == 4, "colours");

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What shade makes of the points' colours: a ramp over a scalar, a height or a distance; exposure and contrast.
 #include "passes.h"
+#include "ramp_span.h"
 #include "base/elementary.h"
 #include "scene/clip.h"
 
 #include <math.h>
 #include <string.h>
-
-struct span {
-    double least, most;
-};
 
 struct spread {
     const struct patina_scene *scene;
@@ -42,7 +39,7 @@ static struct span span_of_boxes(const struct patina_scene *scene, const struct 
     return spread.span;
 }
 
-static struct span span_of(const struct patina_scene *scene, const struct pt_instance *instance)
+struct span pt_ramp_span(const struct patina_scene *scene, const struct pt_instance *instance)
 {
     const float *range = instance->style.ramp_range;
     if (range[0] == range[1] && instance->style.color_source == PATINA_COLOR_TRUST)
@@ -148,7 +145,7 @@ void pt_plan_recolor(struct pt_builder *builder, const struct pt_plan_instance *
     args->instance.has_opacities = planned->args.has_opacities; // discs: the point's own, as its colour
     if (style->color_source == PATINA_COLOR_FIXED || (style->color_source == PATINA_COLOR_TRUST && !trust))
         return;
-    struct span span = span_of(builder->scene, instance);
+    struct span span = pt_ramp_span(builder->scene, instance);
     double slope = span.most != span.least ? 1.0 / (span.most - span.least) : 0.0;
     slope = fabs(slope) < 1e30 ? slope : 0.0;
     set_ramp(builder, instance, out);

@@ -3,8 +3,8 @@
 
 #include "eye.h"
 #include "ranges.h"
-#include "scene/clusters.h"
-#include "scene/paged.h"
+#include "scene/clouds/clusters.h"
+#include "scene/clouds/paged.h"
 
 // A builder's levels need not be exactly twice as wide as the next: what lies within this of a level is of it.
 #define SAME_LEVEL 1.2

@@ -30,7 +30,7 @@ static void plan_edl(struct pt_builder *builder, enum pt_plane color)
         pt_skip(builder, "edl", "no eye-dome lighting is asked for");
         return;
     }
-    struct edl_args args = {.view = *view};
+    struct edl_args args = {.view = *view, .from_eye = view->perspective && builder->scene->camera.panorama_face};
     const double scale = view->perspective ? EDL_LOG : EDL_PIXEL / ((double)view->footprint * pt_finer(builder->scene));
     for (int k = 0; k < PT_EDL_RADII; k++) {
         const double radius = edl_radius(effects, k);
@@ -414,7 +414,7 @@ void pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct
 
 // ---- paper ---------------------------------------------------------------------------------------------------------------
 
-void pt_plan_paper(struct pt_builder *builder)
+static void plan_paper(struct pt_builder *builder)
 {
     const patina_effects *effects = &builder->scene->effects;
     const struct pt_plan *plan = builder->plan;
@@ -456,6 +456,8 @@ void pt_plan_drawn_effects(struct pt_builder *builder, enum pt_plane color)
     plan_contour(builder, color);
     plan_fog(builder, color);
 }
+
+void pt_plan_picture_effects(struct pt_builder *builder) { plan_paper(builder); }
 
 uint32_t pt_effects_reach(const struct patina_scene *scene)
 {

@@ -127,8 +127,10 @@ static int lies_beside(const struct pt_eye *camera, double q[3][8], const double
     return 0;
 }
 
-int pt_chunk_bounds(const struct pt_eye *camera, const struct pt_chunk *chunk, const double rows[9],
-                    const double translation[3], double reach, int balls, struct pt_extent *out)
+// Extent of the chunk's box and what lies within `reach` of it, world units, on screen a pixel wider than exact and not cut off at the
+// picture's; 0 when it is outside the view. balls: what lies within reach of a point beyond the near or far plane may still show.
+static int chunk_bounds(const struct pt_eye *camera, const struct pt_chunk *chunk, const double rows[9],
+                        const double translation[3], double reach, int balls, struct pt_extent *out)
 {
     double *const rect = out->rect;
     const double z_far = camera->orthographic ? camera->far_clip - camera->near_clip : camera->far_clip;
@@ -199,7 +201,7 @@ int pt_kind_bounds(const struct pt_eye *camera, enum pt_kind kind, const struct 
                    const double rows[9], const double translation[3], struct pt_extent *out)
 {
     const struct pt_kind_row *row = &pt_kinds[kind];
-    if (!pt_chunk_bounds(camera, box, rows, translation, row->reach(what, box), row->beyond, out))
+    if (!chunk_bounds(camera, box, rows, translation, row->reach(what, box), row->beyond, out))
         return 0;
     for (int k = 0; k < 4; k++)
         out->rect[k] += k < 2 ? -row->pixels : row->pixels;

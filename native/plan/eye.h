@@ -56,12 +56,8 @@ void pt_object_rows(const struct pt_eye *camera, const struct pt_object *object,
 void pt_chunk_translation(const struct pt_eye *camera, const struct pt_object *object, const struct pt_chunk *chunk,
                           double translation[3]);
 
-// Extent of the chunk's box and what lies within `reach` of it, world units, on screen a pixel wider than exact and not cut off at the
-// picture's; 0 when it is outside the view. balls: what lies within reach of a point beyond the near or far plane may still show.
-int pt_chunk_bounds(const struct pt_eye *camera, const struct pt_chunk *chunk, const double rows[9],
-                    const double translation[3], double reach, int balls, struct pt_extent *out);
-
-// The same of what is drawn in one way, as its kind's row says. box: of a chunk, or of a mesh.
+// Extent on screen of what is drawn in one way, as its kind's row says, a pixel wider than exact. Returns 0 when it is outside the view.
+// box: of a chunk, or of a mesh.
 int pt_kind_bounds(const struct pt_eye *camera, enum pt_kind kind, const struct pt_to_place *what, const struct pt_chunk *box,
                    const double rows[9], const double translation[3], struct pt_extent *out);
 // kinds.c: what nine of ten of the chunk's discs stay below, world units.

@@ -7,7 +7,7 @@
 #include "light_points.h"
 #include "scene/clip.h"
 #include "scene/mask.h"
-#include "scene/paged.h"
+#include "scene/clouds/paged.h"
 #include "scene/soft.h"
 #include "shared/balls.h"
 #include "base/elementary.h"
@@ -43,7 +43,7 @@ static int casts_solid(const struct pt_instance *instance) { return casts(instan
 
 static int casts_soft(const struct pt_instance *instance)
 {
-    return casts(instance) && instance->style.soft != PATINA_SOFT_OFF && instance->style.transparency < 1.0f;
+    return casts(instance) && pt_has_balls(&instance->style) && instance->style.transparency < 1.0f;
 }
 
 int pt_soft_casts(const struct patina_scene *scene)
@@ -57,7 +57,7 @@ int pt_soft_casts(const struct patina_scene *scene)
 int pt_soft_receives(const struct patina_scene *scene)
 {
     for (uint32_t i = 0; i < scene->cloud_count; i++)
-        if (scene->instances[i].style.soft != PATINA_SOFT_OFF && pt_receives(&scene->instances[i]))
+        if (pt_has_balls(&scene->instances[i].style) && pt_receives(&scene->instances[i]))
             return 1;
     return 0;
 }
@@ -159,7 +159,7 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
     return count;
 }
 
-int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t i)
+static int group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t i)
 {
     if (group->only != PT_NO_INSTANCE)
         return pt_same_cloud(scene, i, group->only);
@@ -266,7 +266,7 @@ static struct extent look(const struct patina_scene *scene, const struct pt_shad
     struct pt_inverse_clip *room = malloc((cut.clip_count + 1) * sizeof *room); // without: chunks are seen whole
     for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
-        if (group ? !pt_group_casts(scene, group, i) : !casts(instance))
+        if (group ? !group_casts(scene, group, i) : !casts(instance))
             continue;
         if (group ? !group->soft : casts_solid(instance))
             look_at_points(&cut, instance, PT_SOLID_POINTS, room, &extent);
@@ -398,7 +398,7 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
     out->instances = instances;
     out->cloud_count = 0;
     for (uint32_t i = 0; i < scene->cloud_count; i++)
-        if (pt_group_casts(scene, group, i)) {
+        if (group_casts(scene, group, i)) {
             instances[out->cloud_count] = scene->instances[i];
             instances[out->cloud_count].style.cull_back = 0; // both sides cast
             instances[out->cloud_count].style.surface = 0;   // maps are filled
@@ -529,8 +529,13 @@ static int choose_texel(const struct patina_scene *scene, struct pt_pool *pool, 
 
 int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i)
 {
-    aim(scene, &plan->lights[i]);
-    return choose_texel(scene, plan->pool, &plan->lights[i]);
+    struct pt_plan_light *light = &plan->lights[i];
+    if (light->known)
+        return PATINA_OK;
+    aim(scene, light);
+    const int error = choose_texel(scene, plan->pool, light);
+    light->known = !error;
+    return error;
 }
 
 int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i)
@@ -604,7 +609,7 @@ static void put_cuts(struct key *key, const struct patina_scene *scene, const st
         put(key, (double)shapes[k]);
     if (pt_mask_of(instance))
         put_word(key, pt_mask_of(instance)->hash);
-    if (instance->style.soft == PATINA_SOFT_FIELD) {
+    if (pt_has_field(&instance->style)) {
         put_word(key, instance->style.field->hash);
         put(key, (double)pt_field_steps(instance->style.soft_threshold));
     }

@@ -159,14 +159,14 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
     pt_own_colors(color, &args);
     if (!pt_line_surface(builder, &args.instance) && args.instance.has_opacities)
         paper_with_holes(builder, &args);
-    struct pt_pass *pass = PT_ADD(
-        builder, shade, args,
-        {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0), pt_span_of(plan),
-         pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder), pt_plane_at(color, 0), pt_nothing(),
-         unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS), pt_nothing(),
-         pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0), pt_light_of(builder, &args), pt_ramps_of(&args)});
-    pass->late = pt_shade_late(&args, PT_LATE_PIXELS);
-    PT_REASON(pass, "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);
+    const struct pt_shade_refs own = {.keys = pt_plane_at(PT_PLANE_MESH_SHOWN, 0),
+                                      .normal = pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
+                                      .albedo = pt_plane_at(PT_PLANE_MESH_ALBEDO, 0),
+                                      .opacities = pt_nothing(),
+                                      .shadows = unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS),
+                                      .marks = pt_nothing()};
+    PT_REASON(pt_add_shade(builder, color, &args, &own, PT_LATE_PIXELS), "meshes%s, %u lights", unlit ? " that shine" : "",
+              args.light_count);
 }
 
 void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)

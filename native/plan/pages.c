@@ -3,8 +3,8 @@
 // be damaged (SPEC 13).
 #include "pages.h"
 
-#include "scene/page_sums.h"
-#include "scene/paged.h"
+#include "scene/clouds/page_sums.h"
+#include "scene/clouds/paged.h"
 
 int pt_plan_is_sound(const struct patina_scene *scene, const struct patina_cloud *cloud, uint32_t c)
 {

@@ -159,8 +159,8 @@ void pt_plan_drawn_effects(struct pt_builder *builder, enum pt_plane color);
 // Whether the picture has depth of field; and it, in place of composing.
 int pt_effects_focus(const struct patina_scene *scene);
 void pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct compose_args *compose);
-// On the picture.
-void pt_plan_paper(struct pt_builder *builder);
+// On the composed image, in place: of the crop alone, with lines and soft points.
+void pt_plan_picture_effects(struct pt_builder *builder);
 
 // ---- meshes: mesh.c -----------------------------------------------------------------------------------------------
 
@@ -173,6 +173,12 @@ void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color);
 // shading.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
 void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args);
 struct pt_ref pt_light_of(struct pt_builder *builder, const struct shade_args *args); // what a lit pass reads of them
+// Adds a pass of kernel shade into `color`. own: what it reads of the instance, or of the meshes' pixels. words: when shadow words are read.
+struct pt_shade_refs {
+    struct pt_ref keys, normal, albedo, opacities, shadows, marks;
+};
+struct pt_pass *pt_add_shade(struct pt_builder *builder, enum pt_plane color, const struct shade_args *args,
+                             const struct pt_shade_refs *own, enum pt_late words);
 static inline struct pt_ref pt_ramps_of(const struct shade_args *args)
 {
     return args->recolor.source ? (struct pt_ref){PT_OF_PLAN, PT_PLAN_RAMPS, 0} : pt_nothing();
@@ -185,7 +191,6 @@ static inline enum pt_late pt_shade_late(const struct shade_args *args, enum pt_
 // splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.
 void pt_plan_splat(struct pt_builder *builder);
 int pt_tells_surfaces(const struct pt_builder *builder); // the depth asked for is that of the surface
-int pt_tells_depths(const struct pt_builder *builder);   // and discs, in the mean, tell how far off it is
 void pt_plan_blend(struct pt_builder *builder);          // after pt_plan_resolve of every instance; nothing where no discs are
 int pt_blends_light(const struct pt_builder *builder);   // light arrives at all discs of a pixel: at the mean of their words
 void pt_plan_blend_marks(struct pt_builder *builder);    // in place of mark

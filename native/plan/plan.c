@@ -19,47 +19,60 @@ enum { MAP_ITERATIONS = 2 };
 
 // ---- the passes --------------------------------------------------------------------------------------------------------
 
+// Where shading finds the color of the instance's pixels: a PT_COLOR_*.
+static void set_color_format(const struct pt_builder *builder, const struct pt_plan_instance *instance,
+                             struct instance_args *args)
+{
+    if (pt_kinds[instance->kind].in_planes) {
+        args->color_format = PT_COLOR_OF_PLANE;
+        args->has_opacities = builder->plan->transparent != 0;
+    }
+    if (pt_averages(builder, instance))
+        args->color_format = PT_COLOR_OF_PIXEL;
+}
+
+// Pixels over which filled normals are blended; 0: none. Filled pixels show their source's surface: half a spacing around, they border on
+// the next source's.
+static uint32_t blend_of(const struct pt_builder *builder, const struct pt_plan_instance *instance, uint32_t lit)
+{
+    const struct pt_plan *plan = builder->plan;
+    const int normals = lit || (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u) ||
+                        pt_effects_want_normals(builder->scene);
+    if (plan->quality != PATINA_QUALITY_REFINED || !normals || (pt_kinds[instance->kind].in_planes && !plan->iterations))
+        return 0;
+    return (uint32_t)fmin(fmax(floor(0.5 * plan->spacing_px + 0.5), 1.0), BLEND_MOST);
+}
+
 // color: COLOR_A, or UNLIT for the points' own colours.
 static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane color)
 {
-    struct pt_plan *plan = builder->plan;
-    const struct pt_plan_instance *instance = &plan->instances[i];
+    const struct pt_plan_instance *instance = &builder->plan->instances[i];
     struct shade_args args;
     pt_shade_lights(builder, pt_receives(instance->instance), &args);
-    args.view = pt_view_filled(plan, instance);
+    args.view = pt_view_filled(builder->plan, instance);
     args.instance = instance->args;
     const int shown = pt_line_surface(builder, &args.instance);
     if (!args.instance.lit)
         pt_without_lights(&args);
-    // filled pixels show their source's surface: half a spacing around, they border on the next source's
-    double blend = floor(0.5 * plan->spacing_px + 0.5);
-    uint32_t wants_normals = args.instance.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u) |
-                             (uint32_t)pt_effects_want_normals(builder->scene);
-    const int planes = pt_kinds[instance->kind].in_planes;
-    if (planes && shown) {
-        args.instance.color_format = PT_COLOR_OF_PLANE;
-        args.instance.has_opacities = plan->transparent != 0;
-    }
-    if (shown && pt_averages(builder, instance))
-        args.instance.color_format = PT_COLOR_OF_PIXEL;
-    if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && (!planes || plan->iterations))
-        args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
+    if (shown)
+        set_color_format(builder, instance, &args.instance);
+    args.blend = blend_of(builder, instance, args.instance.lit);
     pt_own_colors(color, &args);
     args.of_pixels = instance->kind == PT_AS_DISCS && args.light_count && pt_blends_light(builder);
     if (shown)
         pt_plan_recolor(builder, instance, &args);
-    int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE || args.instance.color_format == PT_COLOR_OF_PIXEL;
-    struct pt_pass *pass = PT_ADD(
-        builder, shade, args,
-        {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0), pt_span_of(plan),
-         of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_colors_of(instance, i, &args.recolor), pt_shading_of(builder),
-         pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i),
-         args.of_pixels ? pt_plane_at(PT_PLANE_LIGHT, 0) : pt_buffer_of(PT_SHADOWS, instance->of),
-         args.of_pixels ? pt_nothing() : pt_marks_of(builder, instance->of),
-         pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0), pt_light_of(builder, &args), pt_ramps_of(&args)});
-    pass->late = pt_shade_late(&args, PT_LATE_POINTS);
-    PT_REASON(pass, "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
-              args.instance.lit ? "lit" : "unlit", args.light_count, args.blend, args.recolor.source ? ", ramp" : "");
+    const uint32_t format = args.instance.color_format;
+    const int of_plane = format == PT_COLOR_OF_PLANE || format == PT_COLOR_OF_PIXEL;
+    const struct pt_shade_refs own = {
+        .keys = pt_keys_of(builder, 0),
+        .normal = pt_plane_at(PT_PLANE_NORMAL, 0),
+        .albedo = of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_colors_of(instance, i, &args.recolor),
+        .opacities = pt_buffer_of(PT_OPACITIES, i),
+        .shadows = args.of_pixels ? pt_plane_at(PT_PLANE_LIGHT, 0) : pt_buffer_of(PT_SHADOWS, instance->of),
+        .marks = args.of_pixels ? pt_nothing() : pt_marks_of(builder, instance->of)};
+    PT_REASON(pt_add_shade(builder, color, &args, &own, PT_LATE_POINTS),
+              "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i, args.instance.lit ? "lit" : "unlit",
+              args.light_count, args.blend, args.recolor.source ? ", ramp" : "");
 }
 
 // Returns the plane that holds the finished colour.
@@ -550,7 +563,7 @@ static void plan_points(struct pt_builder *builder)
     set_background(&builder->scene->settings, background);
     pt_plan_ink(builder, background);
     plan_soft(builder);
-    pt_plan_paper(builder);
+    pt_plan_picture_effects(builder);
     if (plan->layers == 1)
         put_together(builder);
     pt_plan_assess(builder);
@@ -570,7 +583,7 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
     }
     plan_output(builder, PT_PLANE_COLOR_A);
     plan_soft(builder);
-    pt_plan_paper(builder);
+    pt_plan_picture_effects(builder);
     put_together(builder);
     skip_rest(builder, reason, 0);
     pt_add_passes_step(builder, PT_STEP_PASSES);
@@ -604,7 +617,7 @@ int pt_plan_textures(const struct patina_scene *scene, struct pt_plan *plan)
 int pt_plan_create(const struct patina_scene *scene, struct pt_pool *pool, struct pt_plan *plan)
 {
     struct pt_builder builder = {.scene = scene, .plan = plan};
-    *plan = (struct pt_plan){.pool = pool};
+    *plan = (struct pt_plan){.pool = pool, .panorama = scene->camera.panorama_face != 0};
     if (!scene->has_camera)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
     int error = pt_plan_view(scene, plan);

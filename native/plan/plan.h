@@ -159,7 +159,7 @@ enum pt_instance_buffer {
 };
 enum { PT_RANGE_FINER = PT_FINEST_CHUNKS - PT_FINE_CHUNKS + 1 };
 
-enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
+enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS };
 
 enum pt_plan_buffer { PT_PLAN_LIGHTS, PT_PLAN_RAMPS, PT_PLAN_BUFFERS }; // of plan->light and plan->ramps
 
@@ -197,7 +197,8 @@ struct pt_bounds {
 struct pt_plan_light {
     const patina_light_desc *light;
     uint32_t samples; // wanted
-    // pt_plan_light_map
+    // pt_plan_light_map, once:
+    uint32_t known;
     uint32_t cube;   // six maps a sample instead of one
     uint32_t capped; // its texels are wider than the points' spacing asks for
     double texel;    // width of a texel: at distance 1, or of suns anywhere
@@ -379,6 +380,7 @@ struct pt_plan {
     int filled;             // some points around the picture are pixels, not discs
     uint32_t quality, fill; // as set, or as the error target chose them
     int map;                // of a light
+    int panorama;           // of a face of one
     enum pt_means means;    // that `expected` is of
     patina_expected_error expected;
     uint32_t layers;   // at most so many are peeled; 1: no peeling
@@ -466,7 +468,6 @@ struct pt_eye;
 int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_eye *eye);
 // reopen.c, once the layers are known: plan->reopens.
 uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan *plan);
-int pt_reopen_asked(const struct pt_instance *instance); // whether what its stations saw is needed
 // window.c: whether the instance's points may be discs.
 int pt_knows_discs(const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_instance *instance);
 // Whether every cloud knows how far its points spread, and that is to be kept to.
@@ -559,7 +560,6 @@ int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: it
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);
 
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups); // at most 3 instances + 1
-int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
 int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
 
 uint32_t pt_veil_slabs(const struct patina_scene *map); // of a soft group's scene: as many as there is memory for

@@ -14,11 +14,6 @@ static int asks(const struct pt_instance *instance, uint32_t free_space)
     return shown && instance->style.free_space == free_space && instance->cloud->sights.count > 0;
 }
 
-int pt_reopen_asked(const struct pt_instance *instance)
-{
-    return asks(instance, PATINA_FREE_SPACE_USE) || asks(instance, PATINA_FREE_SPACE_SHOW);
-}
-
 uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     uint32_t asked = 0;

@@ -121,6 +121,18 @@ struct pt_ref pt_light_of(struct pt_builder *builder, const struct shade_args *a
     return (struct pt_ref){PT_OF_PLAN, PT_PLAN_LIGHTS, 0};
 }
 
+struct pt_pass *pt_add_shade(struct pt_builder *builder, enum pt_plane color, const struct shade_args *args,
+                             const struct pt_shade_refs *own, enum pt_late words)
+{
+    struct pt_pass *pass = PT_ADD(builder, shade, *args,
+                                  {own->keys, pt_from_of(builder, 0), own->normal, pt_span_of(builder->plan), own->albedo,
+                                   pt_shading_of(builder), pt_plane_at(color, 0), own->opacities, own->shadows, own->marks,
+                                   pt_plane_if(args->arrived != 0, PT_PLANE_ARRIVED, 0), pt_light_of(builder, args),
+                                   pt_ramps_of(args)});
+    pass->late = pt_shade_late(args, words);
+    return pass;
+}
+
 // ---- what is known late --------------------------------------------------------------------------------------------------
 
 // Of a sum of so many samples, what one of it is of all light.

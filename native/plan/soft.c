@@ -9,7 +9,7 @@
 
 #include "scene/clip.h"
 #include "scene/mask.h"
-#include "scene/paged.h"
+#include "scene/clouds/paged.h"
 #include "scene/soft.h"
 #include "shared/balls.h"
 
@@ -249,8 +249,8 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
     uint64_t chunks = 0;
     float ends[MOST_SLABS];
     for (uint32_t i = 0; i < scene->cloud_count; i++) {
-        instances += scene->instances[i].style.soft != PATINA_SOFT_OFF;
-        chunks += scene->instances[i].style.soft ? pt_chunks_there(scene->instances[i].cloud) : 0;
+        instances += (uint32_t)pt_has_balls(&scene->instances[i].style);
+        chunks += pt_has_balls(&scene->instances[i].style) ? pt_chunks_there(scene->instances[i].cloud) : 0;
     }
     if (!instances)
         return PATINA_OK;
@@ -261,7 +261,7 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
         return PATINA_ERROR_MEMORY;
     int error = PATINA_OK;
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
-        if (scene->instances[i].style.soft)
+        if (pt_has_balls(&scene->instances[i].style))
             error = place_instance(&p, i);
     plan->soft.depths[0] = INFINITY;
     plan->soft.depths[1] = -INFINITY;
@@ -435,7 +435,7 @@ void pt_plan_soft(struct pt_builder *builder)
     const int counted = pt_counts_soft(builder);
     uint32_t soft = 0;
     for (uint32_t i = 0; i < builder->scene->cloud_count; i++)
-        soft += builder->scene->instances[i].style.soft != PATINA_SOFT_OFF;
+        soft += (uint32_t)pt_has_balls(&builder->scene->instances[i].style);
     if (!plan->soft.part_count) {
         const char *reason = soft ? "no soft cloud is in view" : "no cloud is soft";
         pt_skip(builder, "gather", reason);

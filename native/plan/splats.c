@@ -18,7 +18,8 @@ int pt_tells_surfaces(const struct pt_builder *builder)
            (builder->plan->filled || (settings->surface == PATINA_SURFACE_SPLATS && !builder->plan->sigmas));
 }
 
-int pt_tells_depths(const struct pt_builder *builder)
+// And discs, in the mean, tell how far off it is.
+static int tells_depths(const struct pt_builder *builder)
 {
     return builder->layer == 1 && pt_tells_surfaces(builder) && builder->scene->settings.surface == PATINA_SURFACE_SPLATS;
 }
@@ -166,7 +167,7 @@ void pt_plan_blend(struct pt_builder *builder)
 {
     if (!pt_plan_draws(builder->plan, PT_AS_DISCS))
         return;
-    const int depths = pt_tells_depths(builder);
+    const int depths = tells_depths(builder);
     const struct pt_ref planes[] = {pt_keys_of(builder, 0),          pt_plane_at(PT_PLANE_DEFF, 0),
                                     pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_ALBEDO, 0),
                                     pt_plane_at(PT_PLANE_AWAY, 0),   pt_plane_if(depths, PT_PLANE_OFFSET, 0)};

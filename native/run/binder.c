@@ -3,7 +3,7 @@
 
 #include "plan/ranges.h"
 #include "scene/mask.h"
-#include "scene/page_sums.h"
+#include "scene/clouds/page_sums.h"
 #include "scene/scans.h"
 
 #include <stdlib.h>
@@ -94,7 +94,7 @@ static int take_scans(struct pt_binder *binder, struct pt_bound_instance *bound,
 static int bind_field(struct pt_binder *binder, const struct pt_instance *instance, struct pt_bound_instance *bound, int one,
                       struct pt_buffer **out)
 {
-    const struct patina_field *field = instance->style.soft == PATINA_SOFT_FIELD ? instance->style.field : NULL;
+    const struct patina_field *field = pt_has_field(&instance->style) ? instance->style.field : NULL;
     int error = PATINA_OK;
     if (field && !bound->field)
         error = pt_residency_take_bytes(binder->residency, binder->device, field->alive, NULL, 0, &bound->field);

@@ -19,9 +19,10 @@ struct pt_execution {
     struct pt_pager *pager; // of the picture, and of the maps that serve it
     struct pt_times *times;
     const atomic_int *cancel;
+    int stops_writing;                   // whether cancel stops the picture too while it is written
     _Atomic float *progress;             // NULL: nobody looks
     float progress_done, progress_share; // before this plan, and by it
-    int writing;                         // the picture: from then on nothing stops it
+    int writing;                         // the picture
     void **late;                         // per pass: its arguments with what is known late; NULL: as planned
     // of layers
     struct pt_layer *layers;    // NULL: of a map
@@ -47,6 +48,12 @@ void pt_execution_close(struct pt_execution *execution);
 // ---- its parts -----------------------------------------------------------------------------------------------------------
 
 int pt_walk(struct pt_execution *execution, const struct pt_step *step, const struct pt_step *end);
+// What passes poll now. NULL: nothing stops them.
+static inline const atomic_int *pt_polled(const struct pt_execution *e)
+{
+    return e->writing && !e->stops_writing ? NULL : e->cancel;
+}
+
 int pt_run_passes(struct pt_execution *execution, uint32_t first, uint32_t count); // passes.c
 int pt_run_layer(struct pt_execution *execution, const struct pt_step *step);      // layers.c
 int pt_read_covered(struct pt_execution *execution, const struct pt_step *step);

@@ -58,7 +58,8 @@ struct patina_frame {
 
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene);
 // One picture, whatever the scene says of samples: what rendering does over and over.
-int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene); // frame_draw.c
+int pt_frame_check(struct patina_frame *frame, const struct patina_scene *scene); // whether that would be refused for its size
+int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene);  // frame_draw.c
 struct pt_plan;
 // The plan's planes in memory, as the frame's device and what it drew before have it.
 int pt_frame_share_planes(const struct patina_frame *frame, struct pt_plan *plan);

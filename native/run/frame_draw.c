@@ -6,7 +6,7 @@
 #include "execute.h"
 #include "page_check.h"
 
-#include "scene/page_sums.h"
+#include "scene/clouds/page_sums.h"
 
 #include <math.h>
 #include <string.h>
@@ -103,6 +103,7 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
                                      .pager = &frame->pager,
                                      .times = &frame->times,
                                      .cancel = &frame->cancel,
+                                     .stops_writing = !frame->shown.picture_valid,
                                      .progress = &frame->progress,
                                      .progress_done = frame->progress_done,
                                      .progress_share = frame->progress_share,
@@ -122,6 +123,8 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
     frame->pager.merged = frame->merge != NULL;
     frame->pager.cancel = &frame->cancel;
     int error = pt_shadows_open(frame->device, &frame->shadows, scene, plan);
+    if (!error)
+        error = pt_maps_check(frame->device, &frame->planes, &frame->shadows, 0, scene, plan);
     if (!error && !(error = pt_pager_open(&frame->pager, frame->device, scene))) {
         error = pt_execute(&execution);
         error = error ? error : pt_pager_lose(&frame->pager);
@@ -129,7 +132,7 @@ int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scen
     }
     pt_execution_close(&execution);
     if (error)
-        frame->shown.picture_valid &= !execution.writing; // half a picture is none: the device failed
+        frame->shown.picture_valid &= !execution.writing; // half a picture is none: the device failed, or it was the first
     frame->layer_count = execution.layer_count;
     frame->shadow_maps += execution.maps;
     for (int k = 0; k < 2; k++)
@@ -164,6 +167,8 @@ static int draw_once(struct patina_frame *frame, const struct patina_scene *scen
     error = pt_frame_share_planes(frame, &plan);
     if (error)
         pt_fail(&frame->device->handle, error, "planning the frame: out of memory");
+    else
+        error = pt_planes_check(frame->device, &frame->planes, &plan);
     if (!error)
         error = pt_planes_open(frame->device, &frame->planes, &plan);
     if (!error)
@@ -172,6 +177,21 @@ static int draw_once(struct patina_frame *frame, const struct patina_scene *scen
         keep_statistics(frame, scene, &plan, pt_milliseconds() - start);
     pt_plan_destroy(&plan);
     return error;
+}
+
+int pt_frame_check(struct patina_frame *frame, const struct patina_scene *scene)
+{
+    struct pt_plan plan;
+    int error = pt_plan_create(scene, NULL, &plan); // another frame may be drawn by the device's threads meanwhile
+    if (error)
+        return error;
+    error = pt_frame_share_planes(frame, &plan);
+    error = error ? pt_fail(NULL, error, "planning the frame: out of memory")
+                  : pt_planes_check(frame->device, &frame->planes, &plan);
+    if (!error)
+        error = pt_maps_check(frame->device, &frame->planes, &frame->shadows, 1, scene, &plan);
+    pt_plan_destroy(&plan);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
 int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)

@@ -198,7 +198,10 @@ static int draw_step(struct patina_frame *frame, const struct patina_scene *scen
     plain.settings = mean->settings;
     pt_sample_shift(&mean->sampling, mean->done, shift);
     pt_finer_scene(&plain, &mean->sampling, shift, first, end, &finer);
+    frame->shown.picture_valid = 0; // nobody reads the finer picture before: writing this one may stop
     int error = pt_frame_draw(frame, &finer);
+    if (!error && atomic_load(&frame->cancel)) // adding it up takes as long as some passes
+        error = pt_fail(&frame->handle, PATINA_ERROR_CANCELLED, "rendering was cancelled");
     if (!error)
         error = pt_frame_read(frame, PATINA_PASS_COMBINED, mean->fine,
                               (size_t)mean->width * grid * (end - first) * grid * 4 * sizeof *mean->fine);
@@ -244,7 +247,7 @@ static int show(struct patina_frame *frame)
     return PATINA_OK;
 }
 
-// Steps until ms have passed, at least one; what they come to is shown, whatever the end.
+// Steps until ms have passed, at least one. What they come to is shown, unless the picture is lost with an error.
 static int advance(struct patina_frame *frame, const struct patina_scene *scene, double ms)
 {
     const double start = pt_milliseconds();
@@ -255,7 +258,8 @@ static int advance(struct patina_frame *frame, const struct patina_scene *scene,
         error = draw_step(frame, scene);
     while (!error && !mean->ended && ((!is_paired(mean) && !mean->rows) || pt_milliseconds() - start < ms));
     swap(frame, &mean->aside);
-    const int shown = mean->done == 1 && !is_paired(mean) ? PATINA_OK : show(frame);
+    const int lost = error && !mean->settings.pixel_progressive; // with the rest
+    const int shown = lost || (mean->done == 1 && !is_paired(mean)) ? PATINA_OK : show(frame);
     frame->shown.stats.ms += pt_milliseconds() - start;
     frame->shown.stats.pixel_pending = mean->ended
                                            ? 0

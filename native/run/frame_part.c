@@ -6,7 +6,7 @@
 #include "execute.h"
 #include "merge.h"
 #include "page_check.h"
-#include "scene/page_sums.h"
+#include "scene/clouds/page_sums.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -230,6 +230,18 @@ struct part_file {
     const char *path;
 };
 
+// Its keys, and a copy of them that is written.
+static int check_size(const struct part_job *job)
+{
+    const struct pt_plan *plan = &job->plan;
+    const uint64_t keys = pt_plan_plane_bytes(plan, PT_PLANE_KEYS, 0);
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < plan->pass_count && !error; i++)
+        if (pt_is_of_parts(&plan->passes[i]))
+            error = pt_planes_check_pass(job->frame->device, plan, &plan->passes[i]);
+    return error ? error : pt_planes_check_memory(job->frame->device, plan, 0, 2 * keys);
+}
+
 static int scatter_once(struct patina_frame *frame, const struct patina_scene *scene, const void *of)
 {
     const struct part_file *file = of;
@@ -242,7 +254,9 @@ static int scatter_once(struct patina_frame *frame, const struct patina_scene *s
     if (error)
         return error;
     pt_plan_set_bins(&job.plan, frame->device->bin_threads, 0);
-    error = begin(&job, &head);
+    error = check_size(&job);
+    if (!error)
+        error = begin(&job, &head);
     if (!error)
         error = pt_key_writer_begin(&job.writer, &frame->handle, file->path, &head, part->note);
     if (!error) {

@@ -3,8 +3,8 @@
 #include "frame.h"
 
 #include "shown.h"
-#include "scene/paged.h"
-#include "scene/uncolored.h"
+#include "scene/clouds/paged.h"
+#include "scene/clouds/shape_word.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -318,6 +318,12 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
     return length;
 }
 
+static int unwritten(const struct patina_frame *frame, const char *path)
+{
+    return pt_fail(&frame->handle, PATINA_ERROR_FILE,
+                   "%s: cannot be written. Check that its folder exists and the disk has room", path);
+}
+
 int pt_frame_dump(const struct patina_frame *frame, const char *folder)
 {
     const int sampled = frame->sampling[0] * frame->sampling[1] > 1; // what lies between is of the last finer picture
@@ -338,7 +344,7 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
             size_t written = file ? fwrite(copy, 1, plane->size, file) : 0;
             free(copy);
             if (error || !file || fclose(file) || written != plane->size)
-                return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
+                return unwritten(frame, path);
             uint32_t width = pt_plane_rows[p].size == PT_SIZE_CROP ? frame->shown.crop[2]
                                                                    : (frame->shown.plane_width + (1u << level) - 1) >> level;
             snprintf(path, sizeof path, "%s/%s_%d.txt", folder, pt_plane_rows[p].name, level);
@@ -348,7 +354,7 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
                         pt_plane_rows[p].name, level, width, width ? plane->size / pt_plane_bytes((enum pt_plane)p) / width : 0,
                         pt_plane_bytes((enum pt_plane)p)) < 0 ||
                 fclose(file))
-                return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
+                return unwritten(frame, path);
         }
     return PATINA_OK;
 }

@@ -24,9 +24,8 @@
 // sphere 53.3 dB for 47.0, a knot 42.6 for 42.3).
 #define FILLED_SPACING 0.85
 enum {
-    WIDEST = 65536,  // pixels of a side
-    NOISE_GRID = 4,  // with a noise target: what is drawn at once is not much more than what is asked for
-    EDL_WIDEST = 16, // radius, pixels
+    WIDEST = 65536, // pixels of a side
+    NOISE_GRID = 4, // with a noise target: what is drawn at once is not much more than what is asked for
 };
 
 static uint32_t at_most(uint32_t value, uint32_t most) { return value < most ? value : most; }
@@ -35,15 +34,11 @@ static uint32_t at_most(uint32_t value, uint32_t most) { return value < most ? v
 static uint32_t largest_grid(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     const patina_settings *settings = &scene->settings;
-    const patina_effects *effects = &scene->effects;
     const uint32_t side = settings->width > settings->height ? settings->width : settings->height;
     uint32_t most = WIDEST / side;
     if (plan->fill != PATINA_FILL_CLOSED && settings->surface != PATINA_SURFACE_SPLATS && plan->filled)
         return 1; // a point is a pixel wide, or as wide as the paper's filling makes it
-    if (effects->obscurance_strength > 0.0f || effects->focus_aperture > 0.0f || effects->paper_grain > 0.0f)
-        return 1;
-    if (effects->edl_strength > 0.0f)
-        most = at_most(most, (uint32_t)(EDL_WIDEST / effects->edl_radius));
+    most = pt_effects_grid(&scene->effects, most);
     if (plan->line_radius > 0.0f)
         most = at_most(most, (uint32_t)(PT_LINE_MOST / plan->line_radius));
     return most ? most : 1;

@@ -5,7 +5,7 @@
 //   per instance: u64 fingerprint (0: receives no shadows), u64 slots, then the words of the points in chunk order, light by light
 #include "frame.h"
 
-#include "scene/fingerprint.h"
+#include "scene/clouds/fingerprint.h"
 
 #include <stdio.h>
 #include <stdlib.h>

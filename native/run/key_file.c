@@ -3,7 +3,7 @@
 
 #include "base/version.h"
 #include "shared/view.h"
-#include "scene/fingerprint.h"
+#include "scene/clouds/fingerprint.h"
 
 #include <stdlib.h>
 #include <string.h>

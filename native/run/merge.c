@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "merge.h"
 
-#include "scene/fingerprint.h"
+#include "scene/clouds/fingerprint.h"
 
 #include <stdlib.h>
 #include <string.h>

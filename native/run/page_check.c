@@ -2,7 +2,7 @@
 #include "page_check.h"
 
 #include "base/pool.h"
-#include "scene/page_sums.h"
+#include "scene/clouds/page_sums.h"
 
 #include <stdlib.h>
 

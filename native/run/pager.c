@@ -6,7 +6,7 @@
 
 #include "base/platform.h"
 #include "residency.h"
-#include "scene/page_sums.h"
+#include "scene/clouds/page_sums.h"
 
 #include <stdlib.h>
 #include <string.h>

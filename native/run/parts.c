@@ -2,7 +2,7 @@
 // What parts and their merge must agree on before either begins.
 #include "merge.h"
 
-#include "scene/fingerprint.h"
+#include "scene/clouds/fingerprint.h"
 
 #include <string.h>
 

@@ -12,9 +12,24 @@ static uint64_t total_of(const struct pt_planes *planes)
     return total;
 }
 
+uint64_t pt_planes_own(const struct pt_planes *planes) { return total_of(planes); }
+
 uint64_t pt_planes_total(const struct pt_planes *planes)
 {
     return total_of(planes) + (planes->other ? total_of(planes->other) : 0);
+}
+
+int pt_planes_above_cap(const struct patina_device *device, const struct pt_plan *plan)
+{
+    const char *what = plan->map        ? "of a light map of"
+                       : plan->panorama ? "of a panorama's face of"
+                                        : "of an image of",
+               *way = plan->map        ? "lower the shadow resolution"
+                      : plan->panorama ? "make the panorama smaller"
+                                       : "render it in regions";
+    return pt_fail(&device->handle, PATINA_ERROR_TOO_LARGE,
+                   "the planes %s %u x %u pixels take more than the %llu MB allowed: %s", what, plan->crop[2], plan->crop[3],
+                   (unsigned long long)(device->memory_cap >> 20), way);
 }
 
 static int check_cap(const struct patina_device *device, const struct pt_plan *plan, uint64_t total)
@@ -22,9 +37,7 @@ static int check_cap(const struct patina_device *device, const struct pt_plan *p
     const uint64_t cap = device->memory_cap;
     if (!cap || total <= cap)
         return PATINA_OK;
-    return pt_fail(&device->handle, PATINA_ERROR_MEMORY,
-                   "the planes of a %u x %u picture take more than the %llu MB allowed: render it in regions", plan->crop[2],
-                   plan->crop[3], (unsigned long long)(cap >> 20));
+    return pt_planes_above_cap(device, plan);
 }
 
 // Frames of a moving camera differ by some pixels of margin, maps of one light by a texel or two: that is not worth new memory

@@ -5,7 +5,10 @@
 
 #include "plan/plan.h"
 
-enum { PT_SLABS = 128 };
+enum {
+    PT_SLABS = 128,
+    PT_PLANES_SPARE = 8 // one part in so many is added to the planes for what kernels need beside them
+};
 
 // Those of a frame's pictures, or of its lights' maps. `other`: of the same frame, for the device's memory cap counts both.
 struct pt_planes {
@@ -22,6 +25,18 @@ struct pt_planes {
 };
 
 uint64_t pt_planes_total(const struct pt_planes *planes); // bytes that both hold
+uint64_t pt_planes_own(const struct pt_planes *planes);   // bytes that these hold
+// PATINA_ERROR_TOO_LARGE, with a message at the device, unless each plane of the plan fits into the device's buffers, and all of them
+// into the memory cap and the memory that is free. After pt_plan_share_planes. planes: those of the previous picture count as free.
+// Nothing is allocated. Maps of lights have sizes of their own: pt_maps_check.
+int pt_planes_check(const struct patina_device *device, const struct pt_planes *planes, const struct pt_plan *plan);
+// The same of one pass, and of so many bytes of which some are held already.
+int pt_planes_check_pass(const struct patina_device *device, const struct pt_plan *plan, const struct pt_pass *pass);
+int pt_planes_check_memory(const struct patina_device *device, const struct pt_plan *plan, uint64_t held, uint64_t bytes);
+// Whether that would be refused, without a message.
+int pt_planes_lack(const struct patina_device *device, uint64_t held, uint64_t bytes);
+// PATINA_ERROR_TOO_LARGE: the plan's planes take more than the memory cap. The message names the plan's kind and size.
+int pt_planes_above_cap(const struct patina_device *device, const struct pt_plan *plan);
 // Room for a picture's plan, whose planes share memory as it says; before any of it runs.
 int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan);
 // Where planes are poisoned: what holds nothing yet is overwritten before a pass at `when`, what is no longer needed behind it (`ends`),

@@ -3,7 +3,7 @@
 
 #include "page_check.h"
 #include "scene/mask.h"
-#include "scene/paged.h"
+#include "scene/clouds/paged.h"
 #include "scene/soft.h"
 
 #include <stdlib.h>
@@ -36,7 +36,7 @@ static int as_now(const struct patina_device *device, const struct pt_buffer *bu
     return !device->copies || !buffer->size || (buffer->name == 0) == (device->ranges.most != 0);
 }
 
-// Of a cloud of which pages are absent, chunks that lie beside each other at one go: there need be no memory between them (scene/paged.h).
+// Of a cloud of which pages are absent, chunks that lie beside each other at one go: there need be no memory between them (scene/clouds/paged.h).
 static int give_chunks(struct patina_device *device, const struct patina_cloud *cloud, size_t each, const char *data,
                        struct pt_buffer *out)
 {

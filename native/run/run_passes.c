@@ -33,13 +33,13 @@ struct call { // of a pass whose buffers are bound
     const void *arguments;
 };
 
-// The picture is written last and at one go: a cancelled frame leaves the one before it.
+// The picture is written last, and at one go where the frame holds an earlier one: a cancelled frame leaves that.
 static int run_bound(void *context, struct pt_buffer *const *buffers)
 {
     const struct call *call = context;
     struct pt_execution *e = call->execution;
     return e->device->ops->run(e->device, call->pass->kernel, call->arguments, call->pass->argument_size, buffers,
-                               call->pass->ref_count, is_output(call->pass) ? NULL : e->cancel);
+                               call->pass->ref_count, pt_polled(e));
 }
 
 // Bins that the pass found too small; 0: there are none.
@@ -135,10 +135,16 @@ static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
             note_bytes(e, passes, &passes[i], bound[i].buffers);
     }
     if (!error)
-        error = e->device->ops->run_tail(e->device, bound, count);
+        error = e->device->ops->run_tail(e->device, bound, count, pt_polled(e));
     free(bound);
     free(buffers);
     return error;
+}
+
+static int is_cancelled(const struct pt_execution *e)
+{
+    const atomic_int *cancel = pt_polled(e);
+    return cancel && atomic_load(cancel);
 }
 
 // A pass, or `count` as one.
@@ -146,7 +152,7 @@ static int run_some(struct pt_execution *e, uint32_t first, uint32_t count)
 {
     const int output = is_output(&e->plan->passes[first + count - 1]);
     const uint32_t when = e->plan->passes[first].when;
-    if (!e->writing && e->cancel && atomic_load(e->cancel))
+    if (is_cancelled(e))
         return PATINA_ERROR_CANCELLED;
     if (!e->writing && output) {
         const int error = pt_planes_ensure_picture(e->device, e->binder.planes, e->plan);
@@ -232,7 +238,7 @@ static int hand_over(struct pt_execution *e, uint32_t first, uint32_t end)
     int error = bound && groups && buffers ? bind_groups(e, first, end, bound, buffers, groups, &count)
                                            : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     if (!error)
-        error = e->device->ops->run_groups(e->device, groups, count, e->writing ? NULL : e->cancel, e->progress);
+        error = e->device->ops->run_groups(e->device, groups, count, pt_polled(e), e->progress);
     for (uint32_t g = 0, i = first; g < count && !error; i += groups[g++].count)
         note_group(e, name_of(e, i, groups[g].count), &groups[g], g + 1 < count && groups[g + 1].joined);
     free(bound);
@@ -247,7 +253,7 @@ static int run_handed_over(struct pt_execution *e, uint32_t first, uint32_t end)
     for (uint32_t to; first < end && !error; first = to) {
         to = handed_over(e, first, end);
         if (to == first) {
-            if (e->cancel && atomic_load(e->cancel))
+            if (is_cancelled(e))
                 return PATINA_ERROR_CANCELLED;
             error = pt_planes_ensure_picture(e->device, e->binder.planes, e->plan);
             e->writing = 1;

@@ -3,7 +3,7 @@
 // them lasts as long as the picture.
 #include "shadows.h"
 
-#include "scene/fingerprint.h"
+#include "scene/clouds/fingerprint.h"
 
 #include <math.h>
 #include <stdlib.h>

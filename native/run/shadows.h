@@ -67,6 +67,13 @@ int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shad
 struct pt_buffer *pt_shadows_buffer(struct pt_shadows *shadows, uint32_t which, uint32_t instance);
 void pt_shadows_release(struct patina_device *device, struct pt_shadows *shadows);
 
+// ---- map_check.c ---------------------------------------------------------------------------------------------------------
+
+// PATINA_ERROR_TOO_LARGE, with a message at the device, where a light's map does not fit into the device's buffers, the memory cap, or the
+// memory that is free. After pt_plan_share_planes. all: of every light; else of those that this render tests. planes: the picture's.
+int pt_maps_check(const struct patina_device *device, const struct pt_planes *planes, const struct pt_shadows *shadows, int all,
+                  const struct patina_scene *scene, struct pt_plan *plan);
+
 // ---- shadow_pixels.c -----------------------------------------------------------------------------------------------------
 
 // Of all that what a picture shows depends on but the lights: where the camera is, what the planes hold, where meshes are.

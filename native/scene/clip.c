@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "clip.h"
-#include "analysis.h"
+#include "scene/clouds/shape_word.h"
 #include "mask.h"
 #include "scans.h"
 
@@ -44,53 +44,43 @@ static int invert_clip(const patina_clip *clip, struct pt_inverse_clip *out)
 
 // ---- shapes --------------------------------------------------------------------------------------------------------------
 
-static uint64_t below(const patina_cloud_info *info, uint32_t level)
-{
-    uint64_t count = 0;
-    for (uint32_t i = 0; i < level; i++)
-        count += info->trusts[i];
-    return count;
-}
-
 // The least level that the style wants, whether the cloud has points of it or not. 0 of a cloud that was not analysed.
 static uint32_t wanted_level(const struct pt_instance *instance)
 {
-    static const double slack = 1e-4; // the levels in float32 are what they are
     const patina_cloud_info *info = &instance->cloud->info;
     const double least = (double)instance->style.least_trust;
-    uint32_t level = 0;
     if (!info->has_shapes)
         return 0;
-    if (least == 0.0)
-        return pt_default_level(info->trusts);
-    while (level < PT_TRUST_LEVELS - 1 && pt_trust_of_level(level) < least - slack)
-        level++;
-    return level;
+    return least == 0.0 ? pt_default_level(info->trusts) : pt_lowest_level(least);
 }
 
-uint32_t pt_trusted_from(const struct pt_instance *instance)
+// The least level of trust that the instance draws; 0: all points, also where none has as much as the style wants.
+static uint32_t trusted_from(const struct pt_instance *instance)
 {
     const patina_cloud_info *info = &instance->cloud->info;
     const uint32_t level = wanted_level(instance);
-    const uint64_t untrusted = below(info, level);
-    return untrusted && untrusted < below(info, PT_TRUST_LEVELS) ? level : 0;
+    const uint64_t untrusted = pt_points_below(info, level);
+    return untrusted && untrusted < pt_points_below(info, PT_TRUST_TOP + 1) ? level : 0;
 }
 
 uint64_t pt_none_trusted(const struct pt_instance *instance)
 {
     const patina_cloud_info *info = &instance->cloud->info;
-    const uint64_t untrusted = below(info, wanted_level(instance));
-    return untrusted == below(info, PT_TRUST_LEVELS) ? untrusted : 0;
+    const uint64_t untrusted = pt_points_below(info, wanted_level(instance));
+    return untrusted == pt_points_below(info, PT_TRUST_TOP + 1) ? untrusted : 0;
 }
 
-uint64_t pt_untrusted(const struct pt_instance *instance) { return below(&instance->cloud->info, pt_trusted_from(instance)); }
+uint64_t pt_untrusted(const struct pt_instance *instance)
+{
+    return pt_points_below(&instance->cloud->info, trusted_from(instance));
+}
 
 int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8])
 {
     const patina_cloud_style *style = &instance->style;
     uint32_t any = 0;
     memset(hidden, 0, 8 * sizeof *hidden);
-    const uint32_t trusted = pt_trusted_from(instance);
+    const uint32_t trusted = trusted_from(instance);
     const int asked = style->hidden_kinds || trusted || style->free_space == PATINA_FREE_SPACE_USE;
     if (!asked || !instance->cloud->info.has_shapes)
         return 0;
@@ -120,7 +110,7 @@ struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_
     struct pt_sieve sieve = {.instance = instance, .clips = room};
     sieve.hiding_shapes = pt_hidden_shapes(instance, sieve.hidden_shapes);
     sieve.mask = pt_mask_of(instance);
-    if (points != PT_EVERY_POINT && instance->style.soft == PATINA_SOFT_FIELD) {
+    if (instance->style.soft == PATINA_SOFT_HIDDEN || (points != PT_EVERY_POINT && pt_has_field(&instance->style))) {
         sieve.field = instance->style.field;
         sieve.threshold = pt_field_steps(instance->style.soft_threshold);
         sieve.soft = points == PT_SOFT_POINTS;

@@ -41,13 +41,11 @@ struct pt_division {
     int by_class, by_shape, by_mask, by_field, by_scan;
 };
 
-// Which of the bytes from PT_SHAPE_SIGHT_SHIFT on of a shape the style hides, as sift_args has them. 0: none, or the cloud
-// has no shapes.
-// The least level of trust that the instance draws; 0: all points, also where none has as much as the style wants.
-uint32_t pt_trusted_from(const struct pt_instance *instance);
 uint64_t pt_untrusted(const struct pt_instance *instance); // points that it leaves out for their trust
 // All points of a cloud in which none has as much trust as the style wants, so that all are drawn; else 0.
 uint64_t pt_none_trusted(const struct pt_instance *instance);
+// Which of the bytes from PT_SHAPE_SIGHT_SHIFT on of a shape the style hides, as sift_args has them. 0: none, or the cloud
+// has no shapes.
 int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8]);
 // Whether what stations saw through is to be shown in it.
 int pt_is_marked(const struct pt_instance *instance);

@@ -3,7 +3,7 @@
 #ifndef PT_DENSE_H
 #define PT_DENSE_H
 
-#include "cloud.h"
+#include "scene/clouds/cloud.h"
 
 struct pt_dense { // object units; of a chunk of strays lower > upper
     double lower[3], upper[3];

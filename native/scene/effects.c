@@ -74,6 +74,15 @@ int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects)
     return error;
 }
 
+uint32_t pt_effects_grid(const patina_effects *e, uint32_t most)
+{
+#define PATINA_EFFECT_GRID(while_, most_)                                                                                      \
+    if (while_)                                                                                                                \
+        most = most < (uint32_t)(most_) ? most : (uint32_t)(most_);
+#include "patina/effects.def"
+    return most;
+}
+
 void pt_effects_scale(patina_effects *e, float factor)
 {
 #define PT_SCALE_NONE(field)

@@ -8,8 +8,8 @@
 #include "base/error.h"
 #include "base/platform.h"
 #include "base/pool.h"
-#include "fingerprint.h"
-#include "paged.h"
+#include "scene/clouds/fingerprint.h"
+#include "scene/clouds/paged.h"
 #include "base/elementary.h"
 
 #include <float.h>

@@ -6,9 +6,9 @@
 #include "base/color.h"
 #include "base/platform.h"
 #include "base/elementary.h"
-#include "paged.h"
-#include "parts.h"
-#include "uncolored.h"
+#include "scene/clouds/paged.h"
+#include "scene/clouds/parts.h"
+#include "scene/clouds/shape_word.h"
 
 #include <math.h>
 #include <stdlib.h>

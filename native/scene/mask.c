@@ -3,8 +3,8 @@
 #include "mask.h"
 
 #include "base/platform.h"
-#include "paged.h"
-#include "parts.h"
+#include "scene/clouds/paged.h"
+#include "scene/clouds/parts.h"
 
 #include <stdlib.h>
 

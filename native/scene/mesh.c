@@ -2,7 +2,8 @@
 #include "mesh.h"
 #include "base/descriptor.h"
 
-#include "fingerprint.h"
+#include "scene/clouds/fingerprint.h"
+#include "base/vector.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -33,8 +34,6 @@ static int check_desc(patina_mesh_desc *desc)
     return PATINA_OK;
 }
 
-static int finite3(const double v[3]) { return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]); }
-
 static void find_box(const patina_mesh_desc *desc, struct patina_mesh *mesh)
 {
     double *low = mesh->info.box_min, *high = mesh->info.box_max;
@@ -45,7 +44,7 @@ static void find_box(const patina_mesh_desc *desc, struct patina_mesh *mesh)
     for (uint64_t i = 0; i < desc->vertex_count; i++) {
         double p[3];
         pt_read_vector(&desc->position, i, p);
-        for (int k = 0; k < 3 && finite3(p); k++) {
+        for (int k = 0; k < 3 && pt_finite3(p); k++) {
             low[k] = fmin(low[k], p[k]);
             high[k] = fmax(high[k], p[k]);
         }
@@ -63,7 +62,7 @@ static void put3(const patina_array *array, uint64_t index, float *out)
     double v[3];
     pt_read_vector(array, index, v);
     for (int k = 0; k < 3; k++)
-        out[k] = finite3(v) ? (float)v[k] : 0.0f;
+        out[k] = pt_finite3(v) ? (float)v[k] : 0.0f;
 }
 
 static void put_uv(const patina_array *array, uint64_t index, float *out)
@@ -86,7 +85,7 @@ static void take_vertices(const patina_mesh_desc *desc, struct patina_mesh *mesh
         double p[3];
         pt_read_vector(&desc->position, i, p);
         for (int k = 0; k < 3; k++)
-            out[k] = finite3(p) ? (float)(p[k] - mesh->box.origin[k]) : NAN;
+            out[k] = pt_finite3(p) ? (float)(p[k] - mesh->box.origin[k]) : NAN;
         if (mesh->has_normals)
             put3(&desc->normal, i, out + 3);
         if (mesh->has_colors)

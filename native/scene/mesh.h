@@ -3,7 +3,7 @@
 #ifndef PT_MESH_H
 #define PT_MESH_H
 
-#include "cloud.h"
+#include "scene/clouds/cloud.h"
 
 struct patina_mesh {
     struct pt_handle handle;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reach.h"
 
-#include "paged.h"
+#include "scene/clouds/paged.h"
 #include "shared/balls.h"
 #include "shared/discs.h"
 #include "soft.h"
@@ -70,7 +70,7 @@ double pt_chunk_reach(const struct patina_scene *scene, const struct pt_instance
     const int discs = !pt_all_soft(instance) && (scene->settings.surface == PATINA_SURFACE_SPLATS ||
                                                  (scene->settings.surface == PATINA_SURFACE_AUTO && instance->cloud->shapes));
     const double disc = discs ? pt_disc_reach(scene, instance, chunk, scale, most) : 0.0,
-                 ball = instance->style.soft ? pt_ball_reach(scene, instance, chunk, scale) : 0.0;
+                 ball = pt_has_balls(&instance->style) ? pt_ball_reach(scene, instance, chunk, scale) : 0.0;
     return fmax(disc, ball);
 }
 
@@ -79,7 +79,18 @@ double pt_instance_reach(const struct patina_scene *scene, const struct pt_insta
     const struct patina_cloud *cloud = instance->cloud;
     const double scale = pt_stretch(instance->style.world_from_object);
     double most = 0.0;
+    pt_paged_enter(cloud, 0);
+    for (uint32_t page = pt_page_first(cloud); page != PATINA_NO_PAGE;) {
+        const int absent = !pt_page_is_there(cloud, page);
+        if (absent) {
+            struct pt_chunk box;
+            pt_page_box(cloud, page, &box);
+            most = fmax(most, pt_chunk_reach(scene, instance, &box, scale, 1));
+        }
+        page = pt_page_next(cloud, page, !absent || !pt_page_nests(cloud)); // finer pages reach no farther
+    }
     for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < cloud->chunk_count; c++)
         most = fmax(most, pt_chunk_reach(scene, instance, &cloud->chunks[c], scale, 1));
+    pt_paged_leave(cloud);
     return most;
 }

@@ -22,7 +22,7 @@ double pt_ball_scale(const struct patina_scene *scene, const struct pt_instance 
 // what nine of ten stay below, which frames a picture.
 double pt_chunk_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_chunk *chunk,
                       double scale, int most);
-// The most of all chunks that are there.
+// The most of all chunks that are there, and of all pages on their way.
 double pt_instance_reach(const struct patina_scene *scene, const struct pt_instance *instance);
 
 #endif

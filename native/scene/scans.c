@@ -3,7 +3,7 @@
 
 #include "base/platform.h"
 #include "mask.h"
-#include "paged.h"
+#include "scene/clouds/paged.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -4,8 +4,8 @@
 
 #include "clip.h"
 #include "mask.h"
-#include "paged.h"
-#include "parts.h"
+#include "scene/clouds/paged.h"
+#include "scene/clouds/parts.h"
 #include "scans.h"
 #include "shared/balls.h"
 #include "shared/lines.h"
@@ -136,7 +136,7 @@ static int too_many(const patina_scene *scene, uint64_t triangles)
 
 static int check_soft(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
 {
-    if (style->soft > PATINA_SOFT_FIELD || style->soft_model > PATINA_SOFT_ONE_LAYER)
+    if (style->soft > PATINA_SOFT_HIDDEN || style->soft_model > PATINA_SOFT_ONE_LAYER)
         return fail(scene, "cloud style: no such soft or soft_model");
     if (style->soft_shells > (uint32_t)PT_SOFT_SHELLS)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: %u soft_shells; the most is %u", style->soft_shells,
@@ -148,15 +148,14 @@ static int check_soft(const patina_scene *scene, patina_cloud_style *style, cons
         return fail(scene, "cloud style: soft_opacity and soft_modulation must be within 0 and 1");
     if (!(style->soft_threshold >= 0.0f && style->soft_threshold <= 1.0f))
         return fail(scene, "cloud style: soft_threshold must be within 0 and 1");
-    if (style->field ? style->field->handle.magic != PT_MAGIC || style->field->of != cloud->alive
-                     : style->soft == PATINA_SOFT_FIELD)
+    if (style->field ? style->field->handle.magic != PT_MAGIC || style->field->of != cloud->alive : pt_has_field(style))
         return fail(scene, "cloud style: the field is missing, destroyed, or of another cloud");
     style->soft_opacity = style->soft_opacity == 0.0f ? 0.5f : style->soft_opacity;
-    if (!style->soft)
+    if (!pt_has_balls(style))
         return PATINA_OK;
     for (uint32_t i = 0; i < scene->cloud_count; i++) {
         const patina_cloud_style *other = &scene->instances[i].style;
-        if (other->soft && (other->soft_model != style->soft_model || other->soft_shells != style->soft_shells))
+        if (pt_has_balls(other) && (other->soft_model != style->soft_model || other->soft_shells != style->soft_shells))
             return pt_fail(
                 &scene->handle, PATINA_ERROR_ARGUMENT,
                 "cloud style: soft clouds of a scene are drawn together, and instance %u has another soft_model or soft_shells",
@@ -547,7 +546,7 @@ void pt_box_corners(const double lower[3], const double upper[3], const double m
     }
 }
 
-void pt_chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_corner_work *work, void *context)
+static void chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_corner_work *work, void *context)
 {
     double lower[3], upper[3];
     for (int k = 0; k < 3; k++) {
@@ -560,7 +559,7 @@ void pt_chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_
 void pt_mesh_corners(const struct pt_instance *instance, pt_corner_work *work, void *context)
 {
     if (pt_mesh_drawn(instance->mesh))
-        pt_chunk_corners(&instance->mesh->box, instance->mesh_style.world_from_object, work, context);
+        chunk_corners(&instance->mesh->box, instance->mesh_style.world_from_object, work, context);
 }
 
 void pt_cloud_corners(const struct patina_cloud *cloud, const struct pt_sieve *sieve, const double matrix[16],
@@ -573,13 +572,13 @@ void pt_cloud_corners(const struct patina_cloud *cloud, const struct pt_sieve *s
         if (absent) {
             pt_page_box(cloud, page, &box);
             if (!sieve || pt_sieve_page(sieve, &box) != PT_CUT_AWAY)
-                pt_chunk_corners(&box, matrix, work, context);
+                chunk_corners(&box, matrix, work, context);
         }
         page = pt_page_next(cloud, page, !absent || !pt_page_nests(cloud)); // what lies within a box adds nothing
     }
     for (uint32_t c = 0; (c = pt_chunk_from(cloud, c)) < cloud->chunk_count; c++)
         if (!sieve || pt_sieve_chunk(sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
-            pt_chunk_corners(&cloud->chunks[c], matrix, work, context);
+            chunk_corners(&cloud->chunks[c], matrix, work, context);
     pt_paged_leave(cloud);
 }
 

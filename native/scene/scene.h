@@ -3,7 +3,7 @@
 #ifndef PT_SCENE_H
 #define PT_SCENE_H
 
-#include "cloud.h"
+#include "scene/clouds/cloud.h"
 #include "mesh.h"
 #include "texture.h"
 #include "base/vector.h"
@@ -51,6 +51,10 @@ struct patina_scene {
     uint32_t finer; // pixels on each side of one that the caller asked for: of its samples. 0 or 1: it is one
     int in_parts;   // drawn so: plans leave no damaged page out, for all parts must agree on them; binding does
 };
+
+// Returns the largest grid of finer pixels, at most `most`, with which each pixel of the image may be sampled. Finer pixels must
+// not change the look of the effects, see PATINA_EFFECT_GRID in patina/effects.def. Takes effects with explicit defaults.
+uint32_t pt_effects_grid(const patina_effects *effects, uint32_t most);
 
 // Lengths in pixels, of a picture of so many times finer ones.
 void pt_effects_scale(patina_effects *effects, float factor);
@@ -104,10 +108,18 @@ void pt_split_matrix(const double matrix[16], double linear[9], double translati
 typedef void pt_corner_work(void *context, const double corner[3]);
 // The eight of a box, moved by a matrix.
 void pt_box_corners(const double lower[3], const double upper[3], const double matrix[16], pt_corner_work *work, void *context);
-void pt_chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_corner_work *work, void *context);
 int pt_each_corner(const struct patina_scene *scene, pt_corner_work *work, void *context);
 void pt_mesh_corners(const struct pt_instance *instance, pt_corner_work *work, void *context);
 
+// Whether some points may be balls, and whether a field divides the points.
+static inline int pt_has_balls(const patina_cloud_style *style)
+{
+    return style->soft == PATINA_SOFT_ALL || style->soft == PATINA_SOFT_FIELD;
+}
+static inline int pt_has_field(const patina_cloud_style *style)
+{
+    return style->soft == PATINA_SOFT_FIELD || style->soft == PATINA_SOFT_HIDDEN;
+}
 // None of its points is drawn as a point or disc.
 static inline int pt_all_soft(const struct pt_instance *instance) { return instance->style.soft == PATINA_SOFT_ALL; }
 

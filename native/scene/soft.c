@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "soft.h"
 #include "mask.h"
-#include "neighbourhood.h"
+#include "scene/clouds/shape_word.h"
 #include "shared/words.h"
 
 #include <float.h>

@@ -3,7 +3,7 @@
 #ifndef PT_SOFT_H
 #define PT_SOFT_H
 
-#include "cloud.h"
+#include "scene/clouds/cloud.h"
 
 struct patina_field;
 

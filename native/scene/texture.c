@@ -4,7 +4,7 @@
 #include "base/color.h"
 #include "base/descriptor.h"
 
-#include "fingerprint.h"
+#include "scene/clouds/fingerprint.h"
 #include "shared/colors.h"
 
 #include <math.h>

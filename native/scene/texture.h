@@ -3,7 +3,7 @@
 #ifndef PT_TEXTURE_H
 #define PT_TEXTURE_H
 
-#include "cloud.h"
+#include "scene/clouds/cloud.h"
 #include "shared/meshes.h"
 
 struct patina_texture {

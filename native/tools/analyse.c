@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // patina analyse FILE -o OUT.ply: what every point knows, as columns of a binary PLY. IN.cloud -o OUT.cloud: into a saved cloud, of any size.
 #include "tool.h"
+#include "base/words.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -179,12 +180,6 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, int gri
     return result;
 }
 
-static int ends_in(const char *path, const char *ending)
-{
-    const size_t length = strlen(path), size = strlen(ending);
-    return length > size && !strcmp(path + length - size, ending);
-}
-
 static int analyse_cloud(const char *in, const char *out, uint32_t neighbours, uint32_t keep_colors, uint64_t memory,
                          patina_progress *progress)
 {
@@ -241,8 +236,8 @@ int tool_analyse(int count, char **arguments)
     }
     if (!in || !out || !*out)
         return tool_misuse("analyse: a file to read, and -o OUT.ply, please");
-    const int whole = ends_in(out, ".cloud");
-    if (whole != ends_in(in, ".cloud") || (whole && (grid || columns.trusted)) || (!whole && (memory || keep_colors)))
+    const int whole = pt_ends_in(out, ".cloud");
+    if (whole != pt_ends_in(in, ".cloud") || (whole && (grid || columns.trusted)) || (!whole && (memory || keep_colors)))
         return tool_misuse("analyse: of IN.cloud -o OUT.cloud, with --memory or --keep-colors and without --grid or --trusted; "
                            "of any other file -o OUT.ply");
     patina_progress *progress = NULL;

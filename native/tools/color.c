@@ -146,25 +146,31 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
 
 // ---- what they do --------------------------------------------------------------------------------------------------
 
-// Numbers of the attribute by this name; what they are for.
-static int read_numbers(const patina_file *file, const char *name, const char *what, uint64_t *count, float **out)
+int tool_find_attribute(const patina_file *file, const char *name, uint64_t *count, uint32_t *index)
 {
     patina_file_info info = {.struct_size = sizeof info};
     patina_file_attribute attribute = {.struct_size = sizeof attribute};
     int code = patina_file_get_info(file, &info);
-    uint32_t index = 0;
-    for (; index < info.attributes && !code; index++) {
-        code = patina_file_get_attribute(file, index, &attribute);
+    *count = info.count;
+    for (*index = 0; *index < info.attributes && !code; ++*index) {
+        code = patina_file_get_attribute(file, *index, &attribute);
         if (!code && !strcmp(attribute.name, name))
-            break;
+            return PATINA_OK;
     }
-    if (code || index == info.attributes) {
+    *index = UINT32_MAX;
+    return code;
+}
+
+// Numbers of the attribute by this name; what they are for.
+static int read_numbers(const patina_file *file, const char *name, const char *what, uint64_t *count, float **out)
+{
+    uint32_t index;
+    if (tool_find_attribute(file, name, count, &index) || index == UINT32_MAX) {
         tool_say("there is no attribute '%s' to %s", name, what);
         return PATINA_ERROR_ARGUMENT;
     }
-    *count = info.count;
-    *out = malloc(info.count * sizeof **out + 1);
-    return *out ? patina_file_read_attribute(file, index, *out, info.count * sizeof **out) : PATINA_ERROR_MEMORY;
+    *out = malloc(*count * sizeof **out + 1);
+    return *out ? patina_file_read_attribute(file, index, *out, *count * sizeof **out) : PATINA_ERROR_MEMORY;
 }
 
 // A cloud has one: the ramp's, or that which lines follow.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // patina convert IN OUT.ply: any readable file to a binary PLY with position, normal and colour; IN OUT.cloud: to a built cloud.
 #include "tool.h"
+#include "base/words.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -45,12 +46,6 @@ static int read_columns(const patina_file *file, const patina_file_info *info, p
     return code;
 }
 
-static int ends_in(const char *path, const char *ending)
-{
-    const size_t length = strlen(path), size = strlen(ending);
-    return length > size && !strcmp(path + length - size, ending);
-}
-
 static int parse_options(int count, char **arguments, struct tool_build *build)
 {
     for (int i = 0; i < count; i += 2) {
@@ -91,7 +86,7 @@ int tool_convert(int count, char **arguments)
     const int misused = parse_options(count - 2, arguments + 2, &build);
     if (misused)
         return misused;
-    if (ends_in(build.out, ".cloud"))
+    if (pt_ends_in(build.out, ".cloud"))
         return tool_convert_to_cloud(&build);
     if (count > 2)
         return tool_misuse("%s goes into a .cloud", arguments[2]);

@@ -50,6 +50,8 @@ static const char *of_the_whole(const struct tool_options *options)
                                               : NULL;
 }
 
+int tool_may_strip(const struct tool_options *options) { return options->output && !of_the_whole(options); }
+
 static int check_scatter(const struct tool_options *options)
 {
     const char *other = of_the_whole(options);

@@ -16,6 +16,9 @@ static const char commands[] =
     "patina convert IN OUT.cloud          writes a saved cloud: built and analyzed, it opens at once\n"
     "patina analyse FILE -o OUT.ply       writes normal, spacing, radii, thickness, kind and trust of every point\n"
     "patina analyse IN.cloud -o OUT.cloud adds the analysis to a saved cloud\n"
+    "patina distance FILE OTHER -o OUT.ply  adds to each point its distance to another cloud, and the interval of that\n"
+    "patina ground FILE -o OUT.ply        adds to each point its height above the ground\n"
+    "patina draw FILE... --plane PLANE -o OUT.dxf   draws a section, an elevation or a plan to scale\n"
     "patina scatter FILE... -o K.keys     draws one part of the points of an image, for merge\n"
     "patina merge FILE... -o OUT.png      merges tiles or parts into one image\n"
     "patina help [TOPIC|--OPTION|all]     the options of a topic, the topic of an option, or all options\n"
@@ -39,6 +42,45 @@ static const struct topic {
      "  --neighbours K                     analyse: 3 to 64 neighbors (16, and 48 where 16 leave doubts)\n"
      "  --keep-colors                      analyse: of IN.cloud; points without a color stay black\n"
      "  --grid                             analyse: use the rows and columns of scans, with their true borders\n",
+     0},
+    {"measure", "distances between clouds, height above ground",
+     "  --normal-scale D                   distance: diameter of the balls that give the normals, of the file's normals only\n"
+     "                                     the side (two cylinders)\n"
+     "  --cylinder D                       distance: diameter of the cylinders whose points are averaged (six spacings)\n"
+     "  --depth L                          distance: farther surfaces are not looked for (ten cylinders)\n"
+     "  --registration-error R             distance: of the clouds to each other, one standard deviation (0)\n"
+     "  --cell C                           ground: width of a cell (0.5, or by size and spacing)\n"
+     "  --threshold T                      ground: points nearer to the ground than T are ground (a cell)\n"
+     "  --largest W                        ground: width of the largest object, such as a building (100 cells)\n",
+     0},
+    {"draw", "survey drawings to scale: lines as DXF, SVG or GeoJSON, images as PNG or GeoTIFF, both as PDF",
+     "  --plane section:X0,Y0,X1,Y1        a vertical plane along a line; looks to its left\n"
+     "  --plane elevation:AZIMUTH[,DISTANCE]   a vertical plane, seen from where --camera AZIMUTH stands; DISTANCE from\n"
+     "                                     the middle of the clouds towards the viewer (before all points)\n"
+     "  --plane plan:Z                     a horizontal plane at the height Z, seen from above\n"
+     "  --plane frame:X,Y,Z,RX,RY,RZ,UX,UY,UZ   any plane: its middle, its direction to the right, and up\n"
+     "  --extent W,H                       width and height around the plane's middle, meters (the clouds)\n"
+     "  --depth FRONT,BACK                 how far the image reaches before and behind the plane, meters (0, the clouds)\n"
+     "  --scale N                          the scale 1:N (50)\n"
+     "  --thickness T                      of the slab whose points make cut lines, meters (three spacings)\n"
+     "  --contours INTERVAL                contours of the ground, or of a facade, meters; the fifth is heavier\n"
+     "  --outlines                         for DXF and SVG: where surfaces end before what is behind them, at their depth\n"
+     "  --flat                             DXF in millimeters of the sheet, instead of meters at the true place\n"
+     "  --style NAME                       of the image: scan, plaster, technical, ink, blueprint, museum, watercolor,\n"
+     "                                     night or xray (scan)\n"
+     "  --pixel SIZE                       of an image, meters (a third of a line of 0.25 mm on paper)\n"
+     "  --bits 8|16                        of each channel of a GeoTIFF (8)\n"
+     "  --depth-map                        beside OUT.tif, OUT-depth.tif: distances before the plane, float32; NaN: nothing\n"
+     "  --mask                             beside OUT.tif, OUT-mask.tif: 0 nothing, 1 measured, 2 filled\n"
+     "  --crs EPSG:N                       the projected coordinate system of the clouds, for GeoTIFFs of plans (local)\n"
+     "  --sheet NAME                       A0, A1, A2, A3, A4 or Letter, for PDF and SVG: with a frame, a title block, a\n"
+     "                                     scale bar, north and coordinates (the bare drawing)\n"
+     "  --title FIELD=TEXT                 of the title block: title, project, author, number or date; may be repeated\n"
+     "  -o FILE, --output FILE             .dxf, .svg, .pdf, .png or .tif; may be repeated\n"
+     "  --batch FILE.json                  many drawings: a list of objects whose keys are these options, such as\n"
+     "                                     [{\"plane\": \"plan:1.2\", \"scale\": 20, \"outputs\": [\"a.dxf\", \"a.pdf\"]}].\n"
+     "                                     The clouds are read once. Other options of the command are of all drawings\n"
+     "  --device NAME, --threads N         as for render\n",
      0},
     {"output", "size, passes and measurements",
      "  -o FILE, --output FILE             the image, a PNG\n"

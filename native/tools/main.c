@@ -31,9 +31,19 @@ static void print_clean(FILE *out, const char *format, va_list list)
     fputs(line, out);
 }
 
+static char within[320]; // empty: nothing
+
+void tool_say_within(const char *what)
+{
+    snprintf(within, sizeof within, "%s", what ? what : "");
+    clean(within);
+}
+
 static void say(const char *format, va_list list)
 {
     fputs("patina: ", stderr);
+    if (within[0])
+        fprintf(stderr, "%s: ", within);
     print_clean(stderr, format, list);
     fputc('\n', stderr);
 }
@@ -60,7 +70,8 @@ int tool_misuse(const char *format, ...)
     va_start(list, format);
     say(format, list);
     va_end(list);
-    fputs("'patina help' lists commands and options.\n", stderr);
+    if (!within[0])
+        fputs("'patina help' lists commands and options.\n", stderr);
     return TOOL_USAGE;
 }
 
@@ -110,7 +121,8 @@ static void interrupted(void)
     pt_mutex_unlock(&cancel_lock);
 }
 
-int tool_watch_signals(void)
+// Call before any other thread exists: from then on Ctrl-C and SIGTERM cancel what is announced. 0, or an error number.
+static int watch_signals(void)
 {
     pt_mutex_init(&cancel_lock);
     return pt_watch_interrupts(interrupted);
@@ -171,9 +183,10 @@ int main(int count, char **arguments)
     static const struct {
         const char *name;
         int (*run)(int count, char **arguments);
-    } commands[] = {{"render", tool_render}, {"scatter", tool_scatter}, {"merge", tool_merge},
-                    {"info", tool_info},     {"convert", tool_convert}, {"analyse", tool_analyse}};
-    if (tool_watch_signals())
+    } commands[] = {{"render", tool_render},     {"scatter", tool_scatter}, {"merge", tool_merge},
+                    {"info", tool_info},         {"convert", tool_convert}, {"analyse", tool_analyse},
+                    {"distance", tool_distance}, {"ground", tool_ground},   {"draw", tool_draw_lines}};
+    if (watch_signals())
         tool_say("warning: Ctrl-C will end the program without tidying up");
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
         if (strcmp(command, commands[i].name) != 0)

@@ -167,7 +167,7 @@ static int parse_sun(const char *text, struct tool_options *options)
 
 static int parse_width(const char *text, double *width) { return parse_numbers(text, width, 1, 1) < 0 || *width <= 0 ? -1 : 0; }
 
-enum outcome { GOOD, BAD_VALUE, UNKNOWN };
+enum outcome { GOOD = 0, BAD_VALUE = -1, UNKNOWN = 1 };
 
 // Switches without a value. Returns 0 when name is one.
 static int parse_switch(const char *name, struct tool_options *options)
@@ -202,7 +202,8 @@ static int parse_switch(const char *name, struct tool_options *options)
 int tool_is_switch(const char *name)
 {
     struct tool_options ignored;
-    return !strcmp(name, "--grid") || !parse_switch(name, &ignored);
+    return !strcmp(name, "--grid") || !strcmp(name, "--flat") || !strcmp(name, "--depth-map") || !strcmp(name, "--mask") ||
+           !strcmp(name, "--outlines") || !parse_switch(name, &ignored);
 }
 
 // Of silhouettes. All but --lines itself shape those that it asks for.
@@ -367,6 +368,39 @@ static bool is_other_picture(const char *path)
     return false;
 }
 
+int tool_walk_options(const struct tool_syntax *syntax, int count, char **arguments, void *options, int *files)
+{
+    int only_files = 0;
+    *files = 0;
+    for (int i = 0; i < count; i++) {
+        char *name = arguments[i];
+        if (only_files || name[0] != '-' || !name[1]) {
+            arguments[(*files)++] = name;
+            continue;
+        }
+        if (!strcmp(name, "--")) {
+            only_files = 1;
+            continue;
+        }
+        if (!syntax->take_switch(name, options))
+            continue;
+        const char *value = i + 1 < count ? arguments[i + 1] : NULL;
+        const int outcome = syntax->take_value(name, value ? value : "", options);
+        if (outcome > 0)
+            return tool_misuse("%sthere is no option '%s'", syntax->prefix, name);
+        if (!value)
+            return tool_misuse("option '%s' lacks its value", name);
+        if (outcome < 0)
+            return tool_misuse("'%s' is no value for option '%s': see 'patina help %s'", value, name, name);
+        i++;
+    }
+    return TOOL_OK;
+}
+
+static int take_switch(const char *name, void *options) { return parse_switch(name, options); }
+
+static int take_value(const char *name, const char *value, void *options) { return parse_valued(name, value, options); }
+
 int tool_parse_render(int count, char **arguments, struct tool_options *options)
 {
     *options = (struct tool_options){
@@ -380,29 +414,10 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
                      .height = 1024,
                      .world_color = {0.05f, 0.05f, 0.05f}}, // dark enough behind a statue, bright enough in its folds
     };
-    int only_files = 0;
-    for (int i = 0; i < count; i++) {
-        char *name = arguments[i];
-        if (only_files || name[0] != '-' || !name[1]) {
-            arguments[options->file_count++] = name;
-            continue;
-        }
-        if (!strcmp(name, "--")) {
-            only_files = 1;
-            continue;
-        }
-        if (!parse_switch(name, options))
-            continue;
-        const char *value = i + 1 < count ? arguments[i + 1] : NULL;
-        const enum outcome outcome = parse_valued(name, value ? value : "", options);
-        if (outcome == UNKNOWN)
-            return tool_misuse("there is no option '%s'", name);
-        if (!value)
-            return tool_misuse("option '%s' lacks its value", name);
-        if (outcome == BAD_VALUE)
-            return tool_misuse("'%s' is no value for option '%s'", value, name);
-        i++;
-    }
+    static const struct tool_syntax syntax = {"", take_switch, take_value};
+    const int misused = tool_walk_options(&syntax, count, arguments, options, &options->file_count);
+    if (misused)
+        return misused;
     options->settings.film_transparent = options->transparent ? 1 : 0;
     if (!options->planes)
         options->settings.passes = 1u << PATINA_PASS_COMBINED; // a PNG shows no other, but for

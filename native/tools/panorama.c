@@ -2,6 +2,8 @@
 // patina render FILE... --panorama WIDTHxHEIGHT --eye X,Y,Z
 #include "view.h"
 
+#include "base/platform.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,6 +24,22 @@ void tool_panorama(const struct tool_options *options, const struct tool_box *bo
                                   .near_clip = 1e-4 * far,
                                   .far_clip = far};
     memcpy(panorama->region, options->settings.region, sizeof panorama->region);
+}
+
+int tool_panorama_fits(const patina_panorama *panorama)
+{
+    patina_camera camera = {.struct_size = sizeof camera};
+    uint32_t side = 0;
+    if (patina_panorama_camera(panorama, 0, &camera, &side))
+        return 1; // drawing it tells why
+    const uint32_t *r = panorama->region;
+    const uint64_t width = r[2] ? r[2] - r[0] : panorama->width, height = r[3] ? r[3] - r[1] : panorama->height;
+    const uint64_t bytes = (6 * (uint64_t)side * side + width * height) * 4 * sizeof(float), room = pt_free_memory();
+    if (!room || bytes <= room)
+        return 1;
+    tool_say("panorama: six faces of %u x %u pixels need %llu MB of memory, and %llu MB are free: make the panorama smaller",
+             side, side, (unsigned long long)(bytes >> 20), (unsigned long long)(room >> 20));
+    return 0;
 }
 
 // Renders the face that the scene's camera looks at.

@@ -22,34 +22,49 @@ struct tool_png {
     uint8_t *row;
 };
 
-// IEC 61966-2-1; NaN and negative values are black.
-static uint8_t encode_srgb(float linear)
+// IEC 61966-2-1, from 0 to `most`; NaN and negative values are black.
+static float encode_srgb(float linear, float most)
 {
     if (!(linear > 0.0f))
-        return 0;
+        return 0.0f;
     if (linear >= 1.0f)
-        return 255;
+        return most;
     const float curve = linear <= 0.0031308f ? 12.92f * linear
                                              : 1.055f * (float)pt_pow((double)linear, (double)(1.0f / 2.4f)) - 0.055f;
-    return (uint8_t)(curve * 255.0f + 0.5f);
+    return curve * most + 0.5f;
 }
 
-static uint8_t encode_linear(float value)
+static float encode_linear(float value, float most)
 {
     if (!(value > 0.0f))
-        return 0;
-    return value >= 1.0f ? 255 : (uint8_t)(value * 255.0f + 0.5f);
+        return 0.0f;
+    return value >= 1.0f ? most : value * most + 0.5f;
 }
 
-// One row. PNG's alpha is not premultiplied, and its colours are encoded after the division.
-static void encode_row(uint8_t *row, const float *pixels, uint32_t width, int alpha)
+// PNG's and TIFF's alpha is not premultiplied, and colours are encoded after the division.
+static float undo_alpha(const float *pixel, int alpha)
+{
+    return alpha && pixel[3] > 0.0f ? 1.0f / pixel[3] : alpha ? 0.0f : 1.0f;
+}
+
+void tool_encode_row(uint8_t *row, const float *pixels, uint32_t width, int alpha)
 {
     for (uint32_t x = 0; x < width; x++, pixels += 4) {
-        const float inverse = alpha && pixels[3] > 0.0f ? 1.0f / pixels[3] : alpha ? 0.0f : 1.0f;
+        const float inverse = undo_alpha(pixels, alpha);
         for (int i = 0; i < 3; i++)
-            *row++ = encode_srgb(pixels[i] * inverse);
+            *row++ = (uint8_t)encode_srgb(pixels[i] * inverse, 255.0f);
         if (alpha)
-            *row++ = encode_linear(pixels[3]);
+            *row++ = (uint8_t)encode_linear(pixels[3], 255.0f);
+    }
+}
+
+void tool_encode_row16(uint16_t *row, const float *pixels, uint32_t width)
+{
+    for (uint32_t x = 0; x < width; x++, pixels += 4) {
+        const float inverse = undo_alpha(pixels, 1);
+        for (int i = 0; i < 3; i++)
+            *row++ = (uint16_t)encode_srgb(pixels[i] * inverse, 65535.0f);
+        *row++ = (uint16_t)encode_linear(pixels[3], 65535.0f);
     }
 }
 
@@ -154,7 +169,7 @@ int tool_png_rows(struct tool_png *png, const float *pixels, uint32_t rows)
 {
     int bad = 0;
     for (uint32_t y = rows; y-- > 0 && !bad;) { // our row 0 is at the bottom
-        encode_row(png->row, pixels + 4 * (size_t)y * png->width, png->width, png->alpha);
+        tool_encode_row(png->row, pixels + 4 * (size_t)y * png->width, png->width, png->alpha);
         bad = tool_png_bytes(png, png->row);
     }
     return bad;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // patina render FILE... -o OUT.png; patina scatter; and what patina merge does of keys
 #include "view.h"
+#include "base/trust.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -28,7 +29,8 @@ struct job {
     patina_panorama panorama; // where the options ask for one
     patina_frame_stats stats; // of the picture
     double analysis_ms;
-    int lost; // files could not be read any more: pictures lack their points
+    int stripped; // it was too large, and was drawn and written in strips
+    int lost;     // files could not be read any more: pictures lack their points
 };
 
 static void destroy(struct job *job)
@@ -244,17 +246,24 @@ static int dump_plan(struct job *job)
     return TOOL_OK;
 }
 
-// The picture, with the camera as asked for; also the warm-up of the measurement.
-static int draw(struct job *job, double *ms)
+// The picture, with the camera as asked for, of a region; also the warm-up of the measurement. Returns a code of patina.h.
+static int try_region(struct job *job, const uint32_t region[4], double *ms)
 {
     const double start = pt_milliseconds();
     if (job->options.panorama[0]) {
         const int bad = tool_draw_panorama(&job->options, &job->panorama, job->scene, job->frame, &job->pixels, &job->stats);
         job->lost |= job->stats.points_lost > 0;
         *ms = pt_milliseconds() - start;
-        return bad ? tool_failed("panorama", job->frame, bad) : TOOL_OK;
+        return bad;
     }
-    int code = job->options.planes ? patina_frame_keep_planes(job->frame, 1) : PATINA_OK;
+    const size_t count = (size_t)(region[2] - region[0]) * (region[3] - region[1]), size = count * 4 * sizeof(float);
+    patina_settings settings = job->options.settings;
+    memcpy(settings.region, region, sizeof settings.region);
+    int code = patina_scene_set_settings(job->scene, &settings);
+    if (!code && job->options.output && !(job->pixels = malloc(size))) // before any work is done
+        code = PATINA_ERROR_TOO_LARGE;
+    if (!code && job->options.planes)
+        code = patina_frame_keep_planes(job->frame, 1);
     if (!code && job->parts->count)
         code = patina_frame_merge(job->frame, job->scene, job->parts->keys, (uint32_t)job->parts->count, job->parts->next,
                                   &job->round);
@@ -263,29 +272,32 @@ static int draw(struct job *job, double *ms)
     *ms = pt_milliseconds() - start;
     job->stats.struct_size = sizeof job->stats;
     if (job->round)
-        return TOOL_OK;
+        return PATINA_OK;
     if (!code)
         code = patina_frame_get_stats(job->frame, &job->stats);
     job->lost |= job->stats.points_lost > 0;
     if (!code && job->options.planes)
         code = patina_frame_dump_planes(job->frame, job->options.planes);
     if (!code && job->options.output) {
-        const size_t size = (size_t)job->stats.width * job->stats.height * 4 * sizeof(float);
-        job->pixels = malloc(size);
-        code = job->pixels ? patina_frame_read(job->frame, PATINA_PASS_COMBINED, job->pixels, size) : PATINA_ERROR_MEMORY;
+        code = patina_frame_read(job->frame, PATINA_PASS_COMBINED, job->pixels, size);
         if (!code && job->options.pass != PATINA_PASS_COMBINED)
-            code = tool_color_pass(&job->options, job->frame, (size_t)job->stats.width * job->stats.height, job->pixels);
+            code = tool_color_pass(&job->options, job->frame, count, job->pixels);
     }
-    return code ? tool_failed("render", job->frame, code) : TOOL_OK;
+    return code;
 }
 
-// Some rows at a time, from the top, which are written before the next are drawn.
-static int draw_strips(struct job *job, double *ms)
+static int draw_failed(const struct job *job, int code)
+{
+    return code ? tool_failed(job->options.panorama[0] ? "panorama" : "render", job->frame, code) : TOOL_OK;
+}
+
+enum { LEAST_STRIP = 16 }; // rows: the margin around them is wider
+
+// Some rows at a time, from the top, which are written before the next are drawn. rows: at most; where these are too large for the memory
+// or the device, half as many.
+static int draw_strips(struct job *job, const uint32_t region[4], uint32_t rows, double *ms)
 {
     const struct tool_options *options = &job->options;
-    uint32_t region[4] = {0, 0, options->settings.width, options->settings.height};
-    if (options->settings.region[2])
-        memcpy(region, options->settings.region, sizeof region);
     const uint32_t width = region[2] - region[0], height = region[3] - region[1];
     char text[160];
     tool_tile_text(options, text, sizeof text);
@@ -293,24 +305,65 @@ static int draw_strips(struct job *job, double *ms)
                                          options->tile ? tool_tile_name : NULL, text);
     int result = png ? TOOL_OK : TOOL_FAILED;
     for (uint32_t end = region[3]; end > region[1] && !result;) {
-        const uint32_t rows = end - region[1] < options->strip ? end - region[1] : options->strip;
-        patina_settings settings = options->settings;
+        const uint32_t left = end - region[1], some = left < rows ? left : rows;
         double part = 0;
-        memcpy(settings.region, (uint32_t[]){region[0], end - rows, region[2], end}, sizeof settings.region);
-        const int code = patina_scene_set_settings(job->scene, &settings);
-        result = code ? tool_failed("render", job->scene, code) : draw(job, &part);
-        if (!result && tool_png_rows(png, job->pixels, rows))
-            result = TOOL_FAILED;
+        const int code = try_region(job, (uint32_t[]){region[0], end - some, region[2], end}, &part);
+        if (code == PATINA_ERROR_TOO_LARGE && some > LEAST_STRIP) {
+            rows = some / 2;
+        } else {
+            result = draw_failed(job, code);
+            if (!result && tool_png_rows(png, job->pixels, some))
+                result = TOOL_FAILED;
+            end -= some;
+        }
         free(job->pixels);
         job->pixels = NULL;
         *ms += part;
-        end -= rows;
     }
     if (png && tool_png_close(png, !result) && !result)
         result = TOOL_FAILED;
     job->stats.width = width;
     job->stats.height = height;
     return result;
+}
+
+// 0: there are none, and the message says so of the whole.
+static uint32_t rows_that_fit(struct job *job, const uint32_t region[4])
+{
+    const uint32_t height = region[3] - region[1];
+    patina_settings settings = job->options.settings;
+    for (uint32_t rows = (height + 1) / 2; rows >= LEAST_STRIP; rows /= 2) {
+        // That in the middle needs most, for it has margins on both sides.
+        const uint32_t low = region[1] + (height - rows) / 2;
+        memcpy(settings.region, (uint32_t[]){region[0], low, region[2], low + rows}, sizeof settings.region);
+        if (!patina_scene_set_settings(job->scene, &settings) && !patina_frame_check(job->frame, job->scene))
+            return rows;
+    }
+    memcpy(settings.region, region, sizeof settings.region);
+    patina_scene_set_settings(job->scene, &settings);
+    patina_frame_check(job->frame, job->scene);
+    return 0;
+}
+
+// The whole picture, or strips where it is too large.
+static int draw(struct job *job, double *ms)
+{
+    const struct tool_options *options = &job->options;
+    uint32_t region[4] = {0, 0, options->settings.width, options->settings.height};
+    if (options->settings.region[2])
+        memcpy(region, options->settings.region, sizeof region);
+    if (options->strip)
+        return draw_strips(job, region, options->strip, ms);
+    const int code = try_region(job, region, ms);
+    if (code != PATINA_ERROR_TOO_LARGE || !tool_may_strip(options) || job->parts->count)
+        return draw_failed(job, code);
+    free(job->pixels);
+    job->pixels = NULL;
+    const uint32_t rows = rows_that_fit(job, region);
+    if (!rows)
+        return draw_failed(job, code);
+    job->stripped = 1;
+    return draw_strips(job, region, rows, ms);
 }
 
 static int scatter(struct job *job)
@@ -365,6 +418,23 @@ static int measure(struct job *job)
     return code ? tool_failed("render", job->frame, code) : TOOL_OK;
 }
 
+// Prints one warning for each file of which no point has the trust that the options ask for.
+static void warn_of_untrusted(const struct job *job)
+{
+    for (int i = 0; i < job->options.file_count; i++) {
+        patina_cloud_info info = {.struct_size = sizeof info};
+        if (!job->clouds[i] || patina_cloud_get_info(job->clouds[i], &info) || !info.has_shapes)
+            continue;
+        const double asked = (double)job->options.color.least_trust;
+        const double least = asked == 0.0 ? info.trust_default : asked;
+        const uint64_t untrusted = pt_points_below(&info, pt_lowest_level(least));
+        if (untrusted && untrusted == pt_points_below(&info, PT_TRUST_TOP + 1))
+            tool_say(
+                "warning: %s: none of %llu points is trusted, so all of them are drawn. They may all be strays (see --trust)",
+                job->options.files[i], (unsigned long long)untrusted);
+    }
+}
+
 static int run(struct job *job)
 {
     const struct tool_options *options = &job->options;
@@ -376,6 +446,8 @@ static int run(struct job *job)
         result = set_scene(job);
     if (!result && options->dump_plan)
         result = dump_plan(job);
+    if (!result && options->panorama[0] && !tool_panorama_fits(&job->panorama))
+        result = TOOL_FAILED;
     if (!result)
         result = shadows(job);
     if (result || (!options->output && !options->planes && !options->repeat))
@@ -383,17 +455,16 @@ static int run(struct job *job)
     if (job->parts->scatter)
         return scatter(job);
 
-    result = options->strip ? draw_strips(job, &ms) : draw(job, &ms);
+    result = draw(job, &ms);
     if (!result && job->round) {
         tool_say("%s: round %u is wanted: scatter all parts --behind %s, and merge the keys of all rounds", options->output,
                  job->round, job->parts->next);
         return TOOL_AGAIN;
     }
     if (!result && job->stats.none_trusted)
-        tool_say("warning: none of %llu points is trusted, so all of them are drawn: they may be strays alone (see --trust)",
-                 (unsigned long long)job->stats.none_trusted);
+        warn_of_untrusted(job);
     if (!result && options->output) {
-        if (!options->strip && write_picture(job))
+        if (!options->strip && !job->stripped && write_picture(job))
             return TOOL_FAILED;
         char left_out[64] = "";
         if (job->stats.untrusted)

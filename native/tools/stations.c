@@ -9,21 +9,15 @@
 // The attribute by this name as numbers; *out stays NULL where there is none.
 static int read_numbers(const patina_file *file, const char *name, int32_t **out)
 {
-    patina_file_info info = {.struct_size = sizeof info};
-    patina_file_attribute attribute = {.struct_size = sizeof attribute};
-    int code = patina_file_get_info(file, &info);
-    uint32_t index = 0;
-    for (; index < info.attributes && !code; index++) {
-        code = patina_file_get_attribute(file, index, &attribute);
-        if (!code && !strcmp(attribute.name, name))
-            break;
-    }
-    if (code || index == info.attributes)
+    uint64_t count;
+    uint32_t index;
+    int code = tool_find_attribute(file, name, &count, &index);
+    if (code || index == UINT32_MAX)
         return code;
-    float *values = malloc(info.count * sizeof *values + 1); // exact: whole numbers below 2^24
-    *out = malloc(info.count * sizeof **out + 1);
-    code = values && *out ? patina_file_read_attribute(file, index, values, info.count * sizeof *values) : PATINA_ERROR_MEMORY;
-    for (uint64_t i = 0; i < info.count && !code; i++)
+    float *values = malloc(count * sizeof *values + 1); // exact: whole numbers below 2^24
+    *out = malloc(count * sizeof **out + 1);
+    code = values && *out ? patina_file_read_attribute(file, index, values, count * sizeof *values) : PATINA_ERROR_MEMORY;
+    for (uint64_t i = 0; i < count && !code; i++)
         (*out)[i] = values[i] >= 0 && values[i] < 0x1p24f ? (int32_t)values[i] : -1;
     free(values);
     return code;

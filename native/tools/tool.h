@@ -18,6 +18,9 @@ int tool_merge(int count, char **arguments);
 int tool_info(int count, char **arguments);
 int tool_convert(int count, char **arguments);
 int tool_analyse(int count, char **arguments);
+int tool_distance(int count, char **arguments);
+int tool_ground(int count, char **arguments);
+int tool_draw_lines(int count, char **arguments);
 int tool_help(int count, char **arguments);
 
 // The commands, the topics, and the names of their options.
@@ -28,17 +31,30 @@ void tool_print_usage(FILE *out);
 // To standard output, without a line end. Characters that would command a terminal become question marks, as in tool_say.
 void tool_print(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void tool_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
-// Wrong use: the sentence and where help is. Returns TOOL_USAGE.
+// What messages begin with from now on: one of several jobs. NULL: nothing.
+void tool_say_within(const char *what);
+// Wrong use: the sentence and, of a command line, where help is. Returns TOOL_USAGE.
 int tool_misuse(const char *format, ...) __attribute__((format(printf, 1, 2)));
+// How a command takes its options. Both functions get `options`.
+struct tool_syntax {
+    const char *prefix;                                                    // of the message about an unknown option
+    int (*take_switch)(const char *name, void *options);                   // 0 if it is an option without a value
+    int (*take_value)(const char *name, const char *value, void *options); // 0; -1: a bad value; 1: no such option
+};
+
+// Takes all options; other arguments are files, and so are all after "--". Files are moved to the beginning of `arguments`, and *files is
+// how many they are. A tool_exit: TOOL_USAGE after a message.
+int tool_walk_options(const struct tool_syntax *syntax, int count, char **arguments, void *options, int *files);
 // A library call failed: says `what` and the library's message. handle may be NULL. Returns a tool_exit.
 int tool_failed(const char *what, const void *handle, int code);
 // Passes the library's log on; level: the least important kind to show (1 warnings, 2 information too).
 void tool_drain_log(int level);
 
+// The attribute of a file by its name; *index is UINT32_MAX where there is none. count: the file's points. Returns a patina_error.
+int tool_find_attribute(const patina_file *file, const char *name, uint64_t *count, uint32_t *index);
+
 // ---- Ctrl-C ------------------------------------------------------------------------------------------------------
 
-// Call before any other thread exists: from then on Ctrl-C and SIGTERM cancel what is announced below. 0, or an error number.
-int tool_watch_signals(void);
 // What a signal shall cancel; NULL, NULL: nothing. The second signal always ends the program.
 void tool_cancellable(patina_progress *progress, patina_frame *frame);
 int tool_cancelled(void);
@@ -147,6 +163,8 @@ int tool_is_switch(const char *name);
 int tool_parse_farm(const char *name, const char *value, struct tool_options *options);
 // Whether they go with the others, once all are there; scatters: `patina scatter` asks. A tool_exit.
 int tool_check_farm(struct tool_options *options, int scatters);
+// Whether its strips are the whole picture: nothing is asked for that is found of the whole.
+int tool_may_strip(const struct tool_options *options);
 // An option of tool_soft: 0 taken, -1 a bad value, 1 none of them.
 int tool_parse_soft(const char *name, const char *value, struct tool_soft *soft);
 int tool_check_soft(const struct tool_soft *soft, int file_count); // together: a tool_exit
@@ -224,6 +242,10 @@ struct tool_png *tool_png_open(const char *path, uint32_t width, uint32_t height
 int tool_png_rows(struct tool_png *png, const float *pixels, uint32_t rows); // row 0 at the bottom
 int tool_png_bytes(struct tool_png *png, const uint8_t *row);                // as they stand in the file
 int tool_png_close(struct tool_png *png, int good);                          // not good: no file is written
+
+// One row of premultiplied linear RGBA as sRGB of 8 or 16 bits. alpha: keep it; colors are then not premultiplied.
+void tool_encode_row(uint8_t *row, const float *pixels, uint32_t width, int alpha);
+void tool_encode_row16(uint16_t *row, const float *pixels, uint32_t width); // keeps alpha
 
 // The pass that the options ask for, in place of colours in `count` pixels of premultiplied RGBA: where something is. Says the range
 // of the ramp. A patina_error.

@@ -16,13 +16,6 @@ static void normalize(double v[3])
         v[i] /= length;
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 static void rotate_z(double v[3], const double pivot[3], double degrees)
 {
     const double c = pt_cos(degrees * PI / 180), s = pt_sin(degrees * PI / 180);
@@ -68,9 +61,9 @@ static void look(const struct tool_options *options, double turn, patina_camera 
         pole[1] = 1;
         pole[2] = 0;
     }
-    cross(pole, back, right);
+    pt_cross(pole, back, right);
     normalize(right);
-    cross(back, right, up);
+    pt_cross(back, right, up);
     for (int i = 0; i < 3; i++) {
         double *row = camera->world_from_camera + 4 * i;
         row[0] = right[i];

@@ -17,6 +17,8 @@ int tool_lights(patina_scene *scene, const struct tool_options *options, const p
 
 // The panorama that the options ask for.
 void tool_panorama(const struct tool_options *options, const struct tool_box *box, patina_panorama *panorama);
+// Whether its faces fit into the memory that is free; says why not.
+int tool_panorama_fits(const patina_panorama *panorama);
 // Draws it: gives its pixels, which the caller frees, and of the stats points, width and height. Returns a patina_error.
 int tool_draw_panorama(const struct tool_options *options, const patina_panorama *panorama, patina_scene *scene,
                        patina_frame *frame, float **pixels, patina_frame_stats *stats);

@@ -9,11 +9,20 @@
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { edl_args args; };
 layout(std430, binding = BIND_color) buffer color_block { vec4 color[]; };
 
-float depth_of(float z, bool perspective)
+float depth_of(view_args view, uvec2 here, float z)
 {
     if (z == pt_float(PT_KEY_EMPTY_Z))
         return PT_EDL_EMPTY;
-    return perspective ? pt_log2(z) : z;
+    if (view.perspective == 0u)
+        return z;
+    precise float depth = pt_log2(z);
+    if (args.from_eye != 0u) {
+        vec2 ray = pt_ray(view, int(here.x), int(here.y));
+        precise float square = (ray.x * ray.x + ray.y * ray.y) + 1.0;
+        precise float farther = depth + 0.5 * pt_log2(square);
+        depth = farther;
+    }
+    return depth;
 }
 
 // Two spacings of the surface that the pixel shows, in pixels.
@@ -43,7 +52,6 @@ float least_width(view_args view, uvec2 here, uint at, float z)
 void main()
 {
     view_args view = args.view;
-    bool perspective = view.perspective != 0u;
     float scale = args.scale;
     uvec2 here = pt_tile_line(view);
     for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
@@ -51,7 +59,7 @@ void main()
         float z = read_z(at);
         if (z == pt_float(PT_KEY_EMPTY_Z))
             continue;
-        float own = depth_of(z, perspective), width = least_width(view, here, at, z);
+        float own = depth_of(view, here, z), width = least_width(view, here, at, z);
         int radius = 0;
         while (radius < PT_EDL_RADII - 1 && width > args.wide[radius])
             radius++;
@@ -61,7 +69,7 @@ void main()
             int offset = 2 * (PT_EDL_NEIGHBOURS * radius + i);
             uint qx = here.x + uint(args.offsets[offset]), qy = here.y + uint(args.offsets[offset + 1]); // -1 wraps to beyond the plane
             bool inside = qx < view.width && qy < view.height;
-            float near = inside ? depth_of(read_z(qy * view.width + qx), perspective) : PT_EDL_BEYOND;
+            float near = inside ? depth_of(view, uvec2(qx, qy), read_z(qy * view.width + qx)) : PT_EDL_BEYOND;
             precise float behind = scale * (own - near);
             sum = sum + pt_min(pt_max(behind, 0.0), PT_EDL_STEP);
         }

@@ -23,7 +23,10 @@ layout(std430, binding = BIND_tile_list) readonly buffer tile_list_block {
     uint tile_groups[3], tile_count; // the list's head
     uint tile_list[];
 };
+layout(location = 13) uniform uint first_group;  // of this dispatch, where a long list takes several
 layout(location = 15) uniform uint tile_columns; // tiles in a row of the rectangle
+#else
+const uint first_group = 0u;
 #endif
 
 // Column and row of the tile that comes at `index`. False: there are no more.
@@ -39,7 +42,7 @@ bool pt_tile_at(uvec4 rect, uint index, out uvec2 tile)
 #endif
 }
 
-uint pt_tile_group() { return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * PT_TILES_IN_GROUP; }
+uint pt_tile_group() { return (first_group + gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * PT_TILES_IN_GROUP; }
 
 // The first pixel of this invocation's line; the others follow PT_STEP apart.
 uvec2 pt_tile_line(view_args view)

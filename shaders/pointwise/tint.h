@@ -64,7 +64,11 @@ PT_BODY(tint)
     vf per_pixel = vf_rcp(PT_FOOTPRINT(HERE.z)), most = vf_set(0.0f);
     PT_STRUCT tint_band kept, strongest; // of clips that keep the deepest; of all
     bool keeps = false;
-    strongest.d = strongest.strength = strongest.width = strongest.tint[0] = strongest.tint[1] = strongest.tint[2] = vf_set(0.0f);
+    strongest.d = vf_set(0.0f);
+    strongest.strength = strongest.d; // not one chain of assignments: glslangValidator takes endless memory for such
+    strongest.width = strongest.d;
+    for (int k = 0; k < 3; k++)
+        strongest.tint[k] = strongest.d;
     kept = strongest;
     for (uint32_t i = ARGS.clip_first; i < ARGS.clip_first + ARGS.clip_count; i++) {
         PT_STRUCT tint_band band = tint_band_of(PT_GIVES i, x, y, z);

@@ -21,12 +21,12 @@
 #define PT_SOFT_FARTHEST 1e30f // a place beyond is none
 #define PT_SOFT_WIDEST 1e18f   // no radius is more
 #define PT_SOFT_BEFORE 1e-30f  // z of what is before the eye; what is not is lit as if it lay on the view's axis
-#define PT_SOFT_EXPRESS 0u // models
-#define PT_SOFT_CONCENTRIC 1u
-#define PT_SOFT_BASE 2u
-#define PT_SOFT_SPLATS 3u
-#define PT_SOFT_ONE_LAYER 4u
-#define PT_SOFT_MODELS 5u
+#define PT_SOFT_EXPRESS 0 // models; without u, which strict preprocessors refuse in #if
+#define PT_SOFT_CONCENTRIC 1
+#define PT_SOFT_BASE 2
+#define PT_SOFT_SPLATS 3
+#define PT_SOFT_ONE_LAYER 4
+#define PT_SOFT_MODELS 5
 #define PT_SOFT_DISCS(model) ((model) == PT_SOFT_EXPRESS || (model) >= PT_SOFT_SPLATS)
 #define PT_SOFT_EVEN 0u // weights of shells: r / N, which come to the Base model's density
 #define PT_SOFT_EQ13 1u

@@ -24,8 +24,8 @@ struct tint_args {
 #define PT_EDL_EMPTY -3e38f // what empty neighbours have for a depth: nearer than all
 #define PT_EDL_BEYOND 3e38f // beyond the plane: farther, so that it says nothing
 
-// edl: eye-dome lighting. A pixel is darker the farther it lies behind its neighbours: with f(z) = log2 z in perspective, z in
-// orthographic views, colour times 2^(-fade gain sum min(max(scale (f(z) - f(z_q)), 0), PT_EDL_STEP)). Empty neighbours count
+// edl: eye-dome lighting. A pixel is darker the farther it lies behind its neighbours: with f(z) = log2 z in perspective, with from_eye
+// log2 of the distance from the eye, z sqrt(1 + u^2 + v^2), and z in orthographic views, colour times 2^(-fade gain sum min(max(scale (f(z) - f(z_q)), 0), PT_EDL_STEP)). Empty neighbours count
 // as nearer: a silhouette darkens within.
 // Where points are sparse, neighbours lie farther away, so that no disc or cell has an outline of its own. The width of what a
 // pixel shows is d_eff max(|n . v|, PT_EDL_GRAZING) / footprint(z), which is two spacings in pixels, and w the least of
@@ -38,6 +38,7 @@ struct edl_args {
     uint32_t reach;                                        // the largest of them
     float gain[PT_EDL_RADII], wide[PT_EDL_RADII];
     float scale, narrow; // narrow: 1 / the last of wide
+    uint32_t from_eye;   // of perspective views: 0 or 1
 };
 
 #define PT_OBSCURE_TAPS 6

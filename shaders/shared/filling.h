@@ -6,8 +6,8 @@
 #include "shared/view.h"
 #include "shared/words.h"
 
-#define PT_FILL_BACKGROUND 1u // phases of filling
-#define PT_FILL_OCCLUDED 2u
+#define PT_FILL_BACKGROUND 1 // phases of filling; without u, which strict preprocessors refuse in #if
+#define PT_FILL_OCCLUDED 2
 
 // pull: 2 x 2 -> 1, the least key (what a scatter at half the resolution gives).
 struct pull_args {

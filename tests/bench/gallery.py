@@ -4,9 +4,10 @@ with the scanners' places where the file knows them.
 
     build/out/venv/bin/python tests/bench/gallery.py [NAME]... [--library FILE] [--out FOLDER] [--manual]
     build/out/venv/bin/python tests/bench/gallery.py NAME --view X,Y,Z,AZIMUTH,ELEVATION,DISTANCE... [--out FOLDER]
+    build/out/venv/bin/python tests/bench/gallery.py --trust [--manual]
 
 Writes FOLDER/NAME.jpg, a contact sheet each: the cameras from left to right, before above, after beneath. --manual: into
-.pictures/scans, and its README.md that shows them. --view: other cameras, FOLDER/NAME-view.png, to choose them by.
+.pictures/scans, and its README.md that shows them. --trust: all points above, the default beneath, FOLDER/trust-NAME.jpg and trust.md. --view: other cameras, FOLDER/NAME-view.png, to choose them by.
 X, Y, Z: where it looks, in parts of the box of the points without strays; degrees around z from -y and above the
 horizon; how far from there, in diagonals of the box."""
 
@@ -150,17 +151,17 @@ def lights(seen: Any) -> list[dict[str, Any]]:
             for place, color, power in (((-0.8, 0.75, 0.45), (1.0, 0.97, 0.92), 2.8), ((0.9, 0.1, 0.6), (0.8, 0.9, 1.0), 0.6))]
 
 
-def drawn(frame: Any, cloud: Any, turn: np.ndarray, seen: Any, surface: int) -> Image.Image:
+def drawn(frame: Any, cloud: Any, turn: np.ndarray, seen: Any, surface: int, least_trust: float = 0.0) -> Image.Image:
     from patina import native
     from truth.scans.solids import linear
 
     with native.Scene() as scene:
         matrix = np.eye(4)
         matrix[:3, :3] = turn
-        scene.add_cloud(cloud, world_from_object=matrix.ravel().tolist())
+        scene.add_cloud(cloud, world_from_object=matrix.ravel().tolist(), least_trust=least_trust)
         for light in lights(seen):
             scene.add_light(**light)
-        scene.set_settings(width=SIZE[0], height=SIZE[1], surface=surface, passes=1, own_background=1,
+        scene.set_settings(width=SIZE[0], height=SIZE[1], surface=surface, passes=3, own_background=1,
                            background=linear(np.array(SKY)).tolist(), world_color=(0.05, 0.05, 0.05))
         scene.set_camera(**seen.fields())
         frame.render(scene)
@@ -169,23 +170,63 @@ def drawn(frame: Any, cloud: Any, turn: np.ndarray, seen: Any, surface: int) -> 
     return Image.fromarray(np.rint(255.0 * encoded).astype(np.uint8))
 
 
+def seen_from(cloud: Any, scan: Scan, views: tuple[View, ...]) -> list[Any]:
+    """A camera for each view."""
+    corners = np.array(cloud.dense_box()) @ UPRIGHT[scan.up].T
+    return [camera((corners.min(axis=0), corners.max(axis=0)), view) for view in views]
+
+
+def joined(rows: list[tuple[str, list[Image.Image]]]) -> Image.Image:
+    """A sheet of one row for each title and its images."""
+    width, height = SHOWN
+    out = Image.new("RGB", (len(rows[0][1]) * (width + GAP) + GAP, len(rows) * (height + LABEL + GAP)), PAPER)
+    draw = ImageDraw.Draw(out)
+    font = ImageFont.truetype(matplotlib.font_manager.findfont("DejaVu Sans"), 14)
+    for row, (title, images) in enumerate(rows):
+        for column, image in enumerate(images):
+            x, y = GAP + column * (width + GAP), row * (height + LABEL + GAP)
+            out.paste(image.resize(SHOWN, Image.Resampling.LANCZOS), (x, y + LABEL))
+            draw.text((x + 2, y + LABEL // 2), f"{TITLES[column % 3]}, {title}", INK, font, anchor="lm")
+    return out
+
+
 def sheet(frame: Any, scan: Scan, views: tuple[View, ...]) -> tuple[Image.Image, str]:
     """The contact sheet, and what the manual says beneath."""
     before, after, known = clouds(scan)
-    turn = UPRIGHT[scan.up]
-    corners = np.array(before.dense_box()) @ turn.T
-    box = corners.min(axis=0), corners.max(axis=0)
-    width, height = SHOWN
-    out = Image.new("RGB", (len(views) * (width + GAP) + GAP, 2 * (height + LABEL + GAP)), PAPER)
-    draw = ImageDraw.Draw(out)
-    font = ImageFont.truetype(matplotlib.font_manager.findfont("DejaVu Sans"), 14)
-    for column, view in enumerate(views):
-        seen = camera(box, view)
-        for row, (cloud, surface) in enumerate(((before, SURFACE_FILL), (after, SURFACE_AUTO))):
-            x, y = GAP + column * (width + GAP), row * (height + LABEL + GAP)
-            out.paste(drawn(frame, cloud, turn, seen, surface).resize(SHOWN, Image.Resampling.LANCZOS), (x, y + LABEL))
-            draw.text((x + 2, y + LABEL // 2), f"{TITLES[column % 3]}, {('before', 'after')[row]}", INK, font, anchor="lm")
-    return out, f"{before.count:,} points{known}"
+    rows = [(title, [drawn(frame, cloud, UPRIGHT[scan.up], seen, surface) for seen in seen_from(before, scan, views)])
+            for title, cloud, surface in (("before", before, SURFACE_FILL), ("after", after, SURFACE_AUTO))]
+    return joined(rows), f"{before.count:,} points{known}"
+
+
+def trusted(frame: Any, scan: Scan, views: tuple[View, ...]) -> tuple[Image.Image, str]:
+    """The contact sheet of all points and of trusted ones, and its row of the table."""
+    _, cloud, _ = clouds(scan)
+    images: dict[str, list[Image.Image]] = {"all points": [], "default": []}
+    gone, untrusted = [], 0
+    for seen in seen_from(cloud, scan, views):
+        shown = []
+        for title, least in (("all points", -1.0), ("default", 0.0)):
+            images[title].append(drawn(frame, cloud, UPRIGHT[scan.up], seen, SURFACE_AUTO, least))
+            shown.append(np.isfinite(frame.read("DEPTH")[..., 0]))
+        untrusted = frame.stats()["untrusted"]
+        gone.append(100.0 * (shown[0] & ~shown[1]).sum() / max(shown[0].sum(), 1))
+    figures = " / ".join(f"{share:.2f}" for share in gone)
+    return joined(list(images.items())), f"{100.0 * untrusted / cloud.count:.2f} | {figures}"
+
+
+def trust_page(told: list[tuple[Scan, str]]) -> str:
+    parts = ["# Real scans: all points, and only trusted ones", "",
+             "Each sheet shows three views with default settings: all points above (`--trust 0`), the default beneath.",
+             "[The manual](../../addon/manual/trust.md) explains trust. `build/gallery --trust --manual` draws the images and writes this",
+             "page.", "",
+             "| scan | points left out % | near, within, far: pixels that showed something and show nothing now % |", "|---|---|---|",
+             *(f"| {Path(scan.file).name} | {figures} |" for scan, figures in told), ""]
+    parts += [f"Scans of which less than {SHOWN_FROM} % is left out show no difference, and no sheet is kept.", ""]
+    for scan, figures in told:
+        if float(figures.partition(" ")[0]) < SHOWN_FROM:
+            continue
+        parts += [f"**{Path(scan.file).name}**: {scan.told}.", JUDGED.get(scan.name, ""), "", f"![{scan.told}](trust-{scan.name}.jpg)", ""]
+    return "\n".join([*parts, CREDITS])
 
 
 def page(told: list[tuple[Scan, str]]) -> str:
@@ -198,9 +239,22 @@ def page(told: list[tuple[Scan, str]]) -> str:
     return "\n".join([*parts, CREDITS])
 
 
-CREDITS = """The lion is a sample cloud of Potree, copyright © 2011–2020 Markus Schütz, BSD 2-clause; vol_total courtesy of sigeom; Espacio
-Escultórico under the MIT licence; the other lidar samples under BSD licences. Bunny, dragon and armadillo come from the Stanford 3D
-Scanning Repository, Stanford Computer Graphics Laboratory.
+# What the sheets of trust show, by scan.
+JUDGED = {
+    "espacio-escultorico-full-density-crop": "False surface below the platform goes. Worse: the sparse scrub at the rims gets small holes.",
+    "autzen-trim": "Discs in front of the trees shrink or go. Worse: some crowns get holes.",
+    "lone-star": "Specks beside the chimney go. Worse: gaps on the sparse ground grow.",
+    "csite4-orig-utm": "Specks in the air and beyond the rim go. Worse: sparse facades lose points.",
+    "fsite7-orig-utm": "Better: false surface in the air goes, but not all of it. Worse: the row of sparse trees on the field goes, too.",
+    "samp11-utm": "Specks above the slope go.",
+    "vegetation-1-3": "Leaves that are single points go: a little worse.",
+    "certainty3d-color-utm-feet-navd88": "Specks beside the strips go. Worse: the strips' frayed ends get shorter.",
+    "room-scan1": "Sheets between furniture and walls, and one of two discs in the air, go.",
+    "office1": "The veil behind edges, which depth cameras make, gets thinner.",
+}
+SHOWN_FROM = 0.05  # percent of the points left out: sheets with less show no difference
+CREDITS = """Sources and terms of the scans: [images](../README.md). Bunny, dragon and armadillo come from the Stanford 3D Scanning
+Repository, Stanford Computer Graphics Laboratory.
 """
 
 
@@ -211,6 +265,7 @@ def main() -> int:
     parser.add_argument("--library", type=Path, default=ROOT / "build/out/release/libpatina.so")
     parser.add_argument("--out", type=Path, default=ROOT / "build/out/gallery")
     parser.add_argument("--manual", action="store_true")
+    parser.add_argument("--trust", action="store_true", help="all points, and the default")
     options = parser.parse_args()
     os.environ["PATINA_LIBRARY"] = str(options.library.resolve())
     package()
@@ -229,15 +284,18 @@ def main() -> int:
             continue
         views = tuple(tuple(float(word) for word in view.split(",")) for view in options.view or ()) or scan.views
         try:
-            picture, what = sheet(frame, scan, views)
+            picture, what = (trusted if options.trust else sheet)(frame, scan, views)
         except native.PatinaError as error:  # LAZ without laspy
             print(f"skip {scan.name}: {error}", file=sys.stderr)
             continue
-        picture.save(options.out / (f"{scan.name}-view.png" if options.view else f"{scan.name}.jpg"), quality=80)
+        name = f"trust-{scan.name}" if options.trust else scan.name
+        if not (options.trust and options.manual and float(what.partition(" ")[0]) < SHOWN_FROM):
+            picture.save(options.out / (f"{name}-view.png" if options.view else f"{name}.jpg"), quality=80)
         told.append((scan, what))
         print(f"{scan.name}: {what}", flush=True)
     if options.manual and not options.names:
-        (options.out / "README.md").write_text(page(told), encoding="utf-8")
+        name, text = ("trust.md", trust_page(told)) if options.trust else ("README.md", page(told))
+        (options.out / name).write_text(text, encoding="utf-8")
     return 0
 
 

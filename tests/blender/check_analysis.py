@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Points that are analyzed: for final pictures, beside viewports, in linked clouds, as attributes; framing without strays."""
 
+import threading
 import time
 
 import bpy
@@ -14,7 +15,6 @@ from harness import (
     add_points,
     check,
     check_close,
-    check_soon,
     engine,
     linear,
     new_scene,
@@ -27,6 +27,7 @@ from harness import (
 )
 from mathutils import Matrix, Vector
 from patina import native
+from patina.operators import view_tools
 from patina.sync.analyses import analysis, analyzing
 from patina.sync.points import built, linked
 
@@ -312,21 +313,28 @@ def test_beside():
 
 
 def test_beside_is_given_up():
-    """Clouds that nobody shows any more: nobody waits for them."""
+    """Clouds that nobody shows any more: their analysis is cancelled, and goes on for no more than a quarter of its way."""
     points = np.ascontiguousarray(sphere(400000)[0], np.float32)
     cloud, who, analyses = native.Cloud(points), object(), analyzing.Analyses()
 
-    def attempt():
-        analyses.wish(who, [(cloud, None)])
-        analyses.advance(False)
-        analyses.wish(who, [])
-        start = time.perf_counter()
-        while analyses.busy():
-            analyses.advance(False)
-        return time.perf_counter() - start
-
-    check_soon(attempt, 2.0)
-    check(not cloud.has_shapes, "it was analyzed all the same")
+    analyses.wish(who, [(cloud, None)])
+    analyses.advance(False)
+    job = analyses._jobs[cloud]
+    while not job.progress.value() > 0.0:
+        time.sleep(0.001)
+    analyses.wish(who, [])
+    analyses.advance(False)
+    begun = job.progress.value()
+    while not job.task.done():
+        time.sleep(0.001)
+    try:
+        job.task._call("wait")
+        raise AssertionError("it was analyzed all the same")
+    except native.PatinaCancelled:
+        pass
+    check(job.progress.value() - begun < 0.25, f"from {begun} to {job.progress.value()} after the cancel")
+    analyses.advance(False)
+    check(not analyses.busy() and not cloud.has_shapes, "it was analyzed all the same")
     analyses.wish(who, [(cloud, None)])
     analyses.advance(False)
     analyses.clear()
@@ -343,6 +351,73 @@ def test_final_takes_over():
     analyses.finish(cloud, None, progress.append)
     check(cloud.has_shapes and task.done() and len(progress) == 1, "applied")
     check(analyses.advance(False) == [cloud] and not analyses.busy(), "told")
+
+
+def test_applied_without_another_call():
+    """While a thread applies an analysis no other calls the library for the cloud, and who reads the cloud finds all or nothing of it."""
+    cloud, seen = native.Cloud(np.ascontiguousarray(sphere(5000)[0], np.float32)), []
+    task = cloud.start_analysis()
+
+    def look():
+        cloud.dense_box()
+        seen.append((cloud.has_shapes, sum(cloud.kinds)))
+
+    def apply(name):
+        looker.start()
+        looker.join(0.1)  # long enough to get through, were it let
+        check(not seen, "it was called meanwhile")
+        native.Task._call(task, name)
+        check((cloud.has_shapes, sum(cloud.kinds)) == (False, 0), "half of it was seen")
+
+    looker, task._call = threading.Thread(target=look), lambda name: apply(name) if name == "apply" else native.Task._call(task, name)
+    task.result()
+    looker.join()
+    check(seen == [(True, 5000)], f"{seen}")
+
+
+def test_a_final_that_fails_leaves_others_alone():
+    """One that fails before it changes a cloud ends its own analysis, and not what another thread changes."""
+    cloud, analyses = native.Cloud(np.ascontiguousarray(sphere(5000)[0], np.float32)), analyzing.Analyses()
+    analyses._changing = True  # another thread's
+
+    def fails(progress):
+        raise native.PatinaError("no more")
+
+    try:
+        analyses.finish(cloud, None, fails)
+        raise AssertionError("it did not fail")
+    except native.PatinaError:
+        pass
+    check(analyses._changing and cloud not in analyses and not cloud.has_shapes, "it ended what is another's, or left its own")
+    analyses._changing = False
+    analyses.finish(cloud, None, lambda progress: None)
+    check(cloud.has_shapes, "it waits for what failed")
+
+
+def test_tools_wait_for_pictures_under_way():
+    """What describes a scene for a tool may give clouds new colors: no picture of a viewport is under way then."""
+    fresh_scene()
+    add_points(sphere(2000)[0])
+    looks, begun = [], native.Cloud.start
+
+    class Frame:
+        def done(self):
+            looks.append(1)
+            return len(looks) > 3
+
+    def start(*arguments):
+        check(len(looks) > 3, "a picture is under way")
+        return begun(*arguments)
+
+    frame = Frame()
+    analyzing.ANALYSES._frames.add(frame)
+    native.Cloud.start = start
+    try:
+        built = view_tools.describe(bpy.context).clouds
+    finally:
+        native.Cloud.start = begun
+        analyzing.ANALYSES._frames.discard(frame)
+    check(len(built) == 1 and len(looks) == 4, f"{len(looks)} looks")
 
 
 def test_operator():
@@ -423,13 +498,16 @@ def test_frame_points():
 def test_frame_soft_points():
     """A frame holds the radius of soft points and discs, not only their places."""
     scene = fresh_scene(160, 120)
-    for how in ("one", "attribute", "disc"):
+    for how in ("one", "attribute", "disc", "disc beside balls"):
         obj = add_points(np.array([[3.0, 5.0, -7.0]]))
         obj.select_set(True)
         soft = obj.patina.soft
-        soft.use, scene.patina.surface = how != "disc", 'SPLATS' if how == "disc" else 'AUTO'
+        soft.use, scene.patina.surface = how != "disc", 'SPLATS' if "disc" in how else 'AUTO'
         if how == "one":
             soft.use_radius, soft.radius = True, 2.0
+        elif how == "disc beside balls":  # the point is solid
+            soft.by, soft.use_radius, soft.radius, soft.use_range, soft.range_min = 'LUMINANCE', True, 0.1, True, 0.9
+            obj.patina.radius = 2.0
         else:
             obj.data.attributes.new("wide", 'FLOAT', 'POINT').data.foreach_set("value", np.array([2.0], np.float32))
             obj.patina.radius_attribute = "wide"
@@ -445,6 +523,24 @@ def test_frame_soft_points():
         bpy.data.objects.remove(obj)
     scene.patina.surface = 'AUTO'
     built.CACHE.clear()
+
+
+def test_frame_near_points():
+    """A cloud so small that the camera comes closer than it sees: its Clip Start follows, and nothing is cut off."""
+    scene = fresh_scene(160, 120)
+    camera = scene.camera.data
+    camera.clip_start = 0.5
+    counts = []
+    for radius in (1.0, 0.02):
+        obj = add_points(sphere(2000, radius, (3, 5, -7))[0])
+        obj.select_set(True)
+        bpy.context.view_layer.update()
+        check(bpy.ops.object.patina_frame_points() == {'FINISHED'}, "framed")
+        check((camera.clip_start == 0.5) == (radius == 1.0), f"a ball of {radius}: Clip Start is {camera.clip_start}")
+        counts.append(int((render()["Combined"][..., 3] > 0).sum()))
+        bpy.data.objects.remove(obj)
+        built.CACHE.clear()
+    check(abs(counts[1] - counts[0]) < 0.05 * counts[0], f"pixels {counts}")
 
 
 def test_hidden_points():

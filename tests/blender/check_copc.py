@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,11 +14,13 @@ import bpy
 import numpy as np
 from check_formats import with_laspy
 from copc_files import claim, points_of, too_fine, write_copc
-from harness import SCRATCH, check, new_scene, render, reports, stats
+from harness import SCRATCH, check, new_scene, render, reports, sphere, stats
 from mathutils import Matrix
 from patina import memory, native
 from patina.read import streaming
-from patina.sync.points import addresses, built, edits, linked
+from patina.read.importers import PointFile
+from patina.sync.points import addresses, built, edits, linked, origin
+from patina.sync.points import made as points_made
 from range_server import Server
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
@@ -73,23 +76,68 @@ def same(flat, streamed, what):
     check((far > 2e-3).mean() < 0.04 and far.max() < 0.05, f"{what}: colors differ")
 
 
+def flat_and_streamed(path):
+    """Passes of two renders: of the file read whole, and of it streamed."""
+    pictures = []
+    for stream in ('OFF', 'ON'):
+        built.CACHE.clear()
+        new_scene()
+        objects = import_copc(path, stream)
+        objects[0].patina.analysis = 'OFF'
+        see(objects)
+        pictures.append(render())
+    return pictures
+
+
 def test_same_picture_as_flat():
     for name, offset, how in (("plain.copc.laz", (0, 0, 0), {}), ("far.copc.laz", (485000.0, 5428000.0, 300.0), {"pages": True}),
                               ("wide.copc.laz", (0, 0, 0), {"wide": True})):
         path, entries, _ = made(name, offset=offset, **how)
-        pictures = []
-        for stream in ('OFF', 'ON'):
-            built.CACHE.clear()
-            new_scene()
-            objects = import_copc(path, stream)
-            objects[0].patina.analysis = 'OFF'
-            see(objects)
-            pictures.append(render())
+        pictures = flat_and_streamed(path)
         check(f"{POINTS:,} points" in stats[-1] and not reports, f"{stats[-1]} {reports}")
         same(*pictures, name)
         stream = stream_of()
         check(0 < stream.arrived <= len(entries), f"{stream.arrived} pages of {len(entries)}")
         print(f"  {name}: {stream.arrived} of {len(entries)} pages")
+
+
+def test_exported_copc():
+    """What is exported as COPC comes back by laspy and by streaming: the same points, colors and classes, none twice, coarse ones evenly
+    spread; laspy finds those of a box and of a level; the picture as needed is the one of the whole file."""
+    with_laspy()
+    import laspy
+    new_scene()
+    rng = np.random.default_rng(4)
+    positions, _, normals = sphere(POINTS * 2, 1.0, (0, 0, 0))
+    colors = np.concatenate([rng.integers(0, 256, (len(positions), 3)), np.full((len(positions), 1), 255)], 1).astype(np.uint8)
+    classes = (2 + (positions[:, 2] > 0)).astype(np.int8)
+    points = PointFile("scan", positions.astype(np.float32), normals.astype(np.float32), colors, {"class": classes, "point_source_id": np.arange(len(positions), dtype=np.float32)},
+                       (485000.0, 5428000.0, 300.0), 0, {})
+    obj = bpy.data.objects.new("scan", points_made.to_data(replace(points), cloud=False))
+    origin.place(obj, points.origin, origin.shared(bpy.context.scene, points.origin))
+    bpy.context.scene.collection.objects.link(obj)
+    obj.select_set(True)
+    path = SCRATCH / "out.copc.laz"
+    path.unlink(missing_ok=True)
+    bpy.ops.export_scene.patina_points(filepath=str(path), kind='COPC')
+    with laspy.CopcReader.open(path) as reader:
+        back = reader.query()
+        levels = [reader.query(level=level) for level in range(2)]
+        upper = reader.query(bounds=laspy.copc.Bounds(np.array((485000.0, 5428000.0, 300.0)), np.array((485002.0, 5428002.0, 302.0))))
+        spacing = reader.copc_info.spacing
+    check(len(back) == len(positions) == sum(map(len, levels)), f"{[len(level) for level in levels]} of {len(positions)} points")
+    found = np.column_stack([np.column_stack([back.x, back.y, back.z]) - (485000, 5428000, 300), back.red, back.green, back.blue, back.classification])
+    given = np.column_stack([positions, colors[:, :3].astype(int) * 257, classes])
+    check((np.sort(back.point_source_id) == np.arange(len(positions))).all(), "points are twice there")
+    check(np.abs(found - given[back.point_source_id]).max() < 1e-4, "other points, colors or classes")
+    inside = (positions > 0).all(axis=1).sum()
+    check(abs(len(upper) - inside) <= 3, f"{len(upper)} points in the box of {inside}")
+    coarse = np.floor((np.column_stack([levels[0].x, levels[0].y, levels[0].z]) - (484998, 5427998, 298)) / spacing)
+    check(len(np.unique(coarse, axis=0)) > 0.6 * len(coarse) > 6000, f"{len(np.unique(coarse, axis=0))} places of {len(coarse)} coarse points")
+    pictures = flat_and_streamed(path)
+    check(f"{len(positions):,} points" in stats[-1] and not reports, f"{stats[-1]} {reports}")
+    deep = [np.isfinite(picture["Depth"]) for picture in pictures]
+    check(deep[0].mean() > 0.3 and (deep[0] != deep[1]).mean() < 0.001, "depths differ")
 
 
 def test_what_asks_for_the_whole():

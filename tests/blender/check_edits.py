@@ -73,6 +73,46 @@ def test_hide_and_restore():
     check(edits.PROPERTY not in obj, "nothing is left behind")
 
 
+def test_select_mesh_by_value():
+    """In Object and Edit Mode the same points of a mesh are selected, by an attribute or by height; hidden ones never."""
+    new_scene()
+    obj, = import_ply(wall("values.ply", [("intensity", "f4", np.arange(ROWS * ROWS))]))
+    obj.rotation_euler = (np.pi / 2, 0, 0)  # rows are heights now
+    bpy.context.view_layer.objects.active = obj
+    if obj.type != 'MESH':
+        check(not bpy.ops.mesh.patina_select_by_value.poll(), "a point cloud")
+        bpy.ops.object.patina_to_mesh()
+    bpy.context.view_layer.update()
+    number = np.arange(ROWS * ROWS)
+
+    def found():
+        flags = np.zeros(ROWS * ROWS, bool)
+        obj.data.vertices.foreach_get("select", flags)
+        return flags
+
+    for mode in ('OBJECT', 'EDIT'):
+        for options, wanted in (({"attribute": "intensity", "least": 100, "most": 199.5}, (number >= 100) & (number < 200)),
+                                ({"least": 0.0, "most": 2.0, "how": 'ADD'}, (number >= 100) & (number < 200) | (number >= ROWS * ROWS // 2)),
+                                ({"attribute": "intensity", "least": 150, "most": 1e9, "how": 'SUB'}, (number >= 100) & (number < 150)),
+                                ({"attribute": "intensity", "least": 120, "most": 1e9, "how": 'AND'}, (number >= 120) & (number < 150))):
+            bpy.ops.object.mode_set(mode=mode)
+            check(bpy.ops.mesh.patina_select_by_value(**options) == {'FINISHED'} and obj.mode == mode, f"{mode} {options}")
+            bpy.ops.object.mode_set(mode='OBJECT')
+            check((found() == wanted).all(), f"{mode} {options}: {found().sum()} points, not {wanted.sum()}")
+    bpy.ops.object.mode_set(mode='EDIT')
+    bpy.ops.mesh.hide()  # those that are selected
+    bpy.ops.mesh.patina_select_by_value(attribute="intensity", least=100, most=199)
+    bpy.ops.object.mode_set(mode='OBJECT')
+    check((found() == (number >= 100) & (number < 200) & ~((number >= 120) & (number < 150))).all(), "hidden points were selected")
+    for options, wanted in (({"attribute": "heat"}, "has no attribute 'heat'"), ({"least": 3.0, "most": 1.0}, "is greater than")):
+        try:
+            bpy.ops.mesh.patina_select_by_value(**options)
+        except RuntimeError as error:
+            check(wanted in str(error), str(error))
+        else:
+            check(False, f"{options}")
+
+
 def test_ways_to_select():
     obj = scene_with_wall()
     select(right_half())
@@ -93,6 +133,14 @@ def test_ways_to_select():
     check((chosen(obj) == (np.arange(ROWS) >= ROWS // 2)).all(), "class 6")
     bpy.ops.object.patina_points_select_by(by='SCAN', number=3, how='AND')
     check(chosen(obj).sum() == ROWS * ROWS // 4 and chosen(obj)[ROWS // 2:, ROWS // 2:].all(), "scan 3 of it")
+    bpy.ops.object.patina_points_select_by(by='VALUE', attribute="scan", least=1, most=3)
+    check((chosen(obj) == (np.arange(ROWS) >= ROWS // 2)[:, None]).all(), "scans from 1 to 3")
+    bpy.ops.object.patina_points_select_by(by='VALUE', least=-0.5, most=0.5, how='AND')  # the height, which is the world's z
+    check(not chosen(obj).any(), "heights about 0, of a wall at -4")
+    obj.patina.colors.source, obj.patina.colors.scalar = 'SCALAR', "classification"
+    bpy.ops.object.patina_points_select_by(by='VALUE', least=2, most=5)
+    check((chosen(obj) == (np.arange(ROWS) < ROWS // 2)).all(), "what colors the points")
+    obj.patina.colors.source = 'OWN'
     box = bpy.data.objects.new("box", None)
     box.location, box.scale = (-0.5, 0.5, -4.0), (0.24, 0.24, 1.0)
     box.patina.clip.shape, box.patina.clip.cut = 'BOX', True
@@ -102,11 +150,13 @@ def test_ways_to_select():
     x = (np.arange(ROWS) + 0.5) / ROWS * 2 - 1
     inside = (abs(x[None] + 0.5) < 0.24) & (abs(x[:, None] - 0.5) < 0.24)
     check((chosen(obj) == inside).all(), f"{chosen(obj).sum()} within the box, not {inside.sum()}")
-    for options in ({"by": 'CLASS', "number": 9}, {"by": 'SCAN', "number": 7}):
+    for options, wanted in (({"by": 'CLASS', "number": 9}, "no point is of"), ({"by": 'SCAN', "number": 7}, "no point is of"),
+                            ({"by": 'VALUE', "attribute": "heat"}, "no attribute 'heat'. It has: "),
+                            ({"by": 'VALUE', "attribute": "scan", "least": 3, "most": 1}, "is greater than")):
         try:
             bpy.ops.object.patina_points_select_by(**options)
         except RuntimeError as error:
-            check("no point is of" in str(error), str(error))
+            check(wanted in str(error), str(error))
         else:
             check(False, f"{options}")
 

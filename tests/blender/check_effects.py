@@ -11,7 +11,7 @@ from patina import native, sync
 from patina.description.settings import Effects
 
 POINT = (0.01, 0.01, -3.0)
-SHOWN = [effect for effect in native.abi.EFFECTS if effect["panel"] != "CAMERA"]
+SHOWN = native.abi.OWN_EFFECTS
 
 
 def one_point(color=(200, 120, 60)):

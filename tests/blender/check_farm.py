@@ -13,6 +13,7 @@ import numpy as np
 from check_import import import_ply
 from check_linked import dense
 from harness import REPOSITORY, SCRATCH, Skip, add_points, check, forget_files, new_scene, render
+from patina import native
 from patina.farm import task
 from patina.read import importers
 from patina.sync.points import built, linked
@@ -197,6 +198,68 @@ def test_farm_shares_built_clouds():
         importers.steps = steps
         built.CACHE.clear()
         aside.rename(own)
+
+
+# Runs in each of several Blenders before the file is opened: none builds a cloud until all of them are about to.
+_TOGETHER = """
+import os, sys, time
+from pathlib import Path
+sys.path.insert(0, str(Path(os.environ["PATINA_ADDON"]).parent))
+import patina
+from patina.sync.points import linked
+patina.register()
+here, make = Path({folder!r}), linked._make
+
+def together(*arguments):
+    (here / str(os.getpid())).touch()
+    until = time.monotonic() + 100
+    while len(list(here.iterdir())) < 3 and time.monotonic() < until:
+        time.sleep(0.002)
+    yield from ()
+    return (yield from make(*arguments))
+
+linked._make = together
+"""
+
+
+def test_three_build_one_cloud_at_once():
+    """Two Blenders and a task of a farm: each draws the same image, and one whole file is left of what they built and analyzed."""
+    env = farm_blender()
+    folder, cache, met = (SCRATCH / f"at-once{end}" for end in ("", "-cache", "-met"))
+    for place in (folder, cache, met):
+        place.mkdir()
+    scene = clean_scene()
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 61, 47, 100
+    scene.render.image_settings.file_format, scene.render.dither_intensity = 'PNG', 0.0
+    scene.camera.location.z = 5.0  # scans lie at zero
+    obj, = import_ply(dense("at-once/scan.ply", 30000), link=True)
+    scene.render.filepath = str(SCRATCH / "alone.png")
+    bpy.ops.render.render(write_still=True)
+    alone = pixels_of(SCRATCH / "alone.png")
+    check(len(np.unique(alone)) > 20, "nothing is drawn")
+    own = linked.source_of(obj, 1, []).kept
+    scene.render.filepath = str(folder / "task-#.png")
+    bpy.ops.render.patina_farm(directory=str(folder / "job"), kind='FRAMES')
+    shutil.rmtree(folder / ".patina")  # what the job brought along
+    script, together = Path(env["PATINA_BLENDER"]).with_name("together"), met.with_suffix(".py")
+    together.write_text(_TOGETHER.replace("{folder!r}", repr(str(met))), encoding="utf-8")
+    script.write_text(f'#!/bin/sh\n[ "$1" = --version ] && exec "{bpy.app.binary_path}" --version\n'
+                      f'exec "{bpy.app.binary_path}" --factory-startup --python-exit-code 1 --python "{together}" "$@"\n', encoding="utf-8")
+    script.chmod(0o755)
+    env |= {"PATINA_BLENDER": str(script), "BLENDER_USER_DATAFILES": str(cache)}
+    others = [subprocess.Popen([script, "-b", folder / "job/scene.blend", "-o", folder / f"{name}-#", "-f", "1"], env=env, stdout=subprocess.PIPE,
+                               stderr=subprocess.STDOUT, text=True) for name in ("one", "two")]
+    said = [run_task(folder / "job", "frame", 1, env=env), *(other.communicate(timeout=200)[0] for other in others)]
+    check([other.returncode for other in others] == [0, 0], f"{said[1:]}"[-1500:])
+    check(len(list(met.iterdir())) == 3, f"{len(list(met.iterdir()))} of 3 built: {said}"[-1500:])
+    for name in ("task", "one", "two"):
+        check(np.array_equal(pixels_of(folder / f"{name}-1.png"), alone), f"{name} differs")
+    left = {path.name: path for path in cache.rglob("*") if path.is_file()}
+    check(set(left) == {own.name, own.with_suffix(".json").name}, f"{sorted(left)}")
+    check(left[own.name].read_bytes() == own.read_bytes(), "the cloud is another one")
+    native.Cloud.start_verifying(left[own.name]).result()
+    with native.Cloud.open(left[own.name]) as cloud:
+        check(cloud.has_shapes and cloud.count == 30000, "it is not analyzed")
 
 
 def test_farm_tasks_are_named():

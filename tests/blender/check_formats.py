@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Point files of many kinds in, PLY, LAS, LAZ and E57 out: what is kept, what is refused and how."""
+"""Point files of many kinds in, PLY, LAS, LAZ, COPC and E57 out: what is kept, what is refused and how."""
 
 import contextlib
 import os
@@ -117,15 +117,16 @@ def test_las_round_trip():
     kinds = [("las", 6e-5), ("ply", 1e-9)]
     with contextlib.suppress(Skip):
         with_laspy()
-        kinds.append(("laz", 6e-5))
+        kinds += [("laz", 6e-5), ("copc.laz", 6e-5)]
     for kind, tolerance in kinds:
         path = SCRATCH / f"trip.{kind}"
-        export(path, kind.upper())
+        export(path, kind.partition(".")[0].upper())
         back = importers.reader(path).read(path, importers.Filter(), importers.Progress())
-        check_close(back.positions.astype(np.float64) + back.origin, kept, tolerance + 4e-6, kind)
-        check_close(back.colors, points.colors, 0, f"{kind} colours")
+        order = np.argsort(back.scalars["gps_time"])  # COPC has another
+        check_close(back.positions[order].astype(np.float64) + back.origin, kept, tolerance + 4e-6, kind)
+        check_close(back.colors[order], points.colors, 0, f"{kind} colours")
         for name in ("intensity", "class", "user_data"):
-            check_close(back.scalars[name], points.scalars[name], 0, f"{kind} {name}")
+            check_close(back.scalars[name][order], points.scalars[name], 0, f"{kind} {name}")
     path = SCRATCH / "trip.las"
     back = las.read(path, importers.Filter(), importers.Progress())
     check(back.notes["crs"] == points.notes["crs"], f"CRS {back.notes}")
@@ -145,9 +146,12 @@ def test_export_by_name():
         check(path.read_bytes()[:4] == (b"LASF" if written.lower().endswith("las") else b"ply\n"), f"{name}: {written}")
         path.unlink()
     from patina.operators.export_points import PATINA_OT_export_points as export_points
-    dialog = SimpleNamespace(kind='PLY', _seen='PLY', filepath="/a/scan.ply")
+    dialog = SimpleNamespace(kind='PLY', _seen='PLY', filepath="/a/scan.ply", kind_of=lambda path: export_points.kind_of(None, path),
+                             ending_of=lambda kind: export_points.ending_of(None, kind))
     for change, kind, name in (({}, 'PLY', "scan.ply"), ({"filepath": "/a/scan.las"}, 'LAS', "scan.las"), ({"kind": 'PLY'}, 'PLY', "scan.ply"),
-                               ({"filepath": "/a/more"}, 'PLY', "more.ply"), ({"kind": 'LAS'}, 'LAS', "more.las")):
+                               ({"filepath": "/a/more"}, 'PLY', "more.ply"), ({"kind": 'LAS'}, 'LAS', "more.las"),
+                               ({"kind": 'COPC'}, 'COPC', "more.copc.laz"), ({"kind": 'LAZ'}, 'LAZ', "more.laz"),
+                               ({"filepath": "/a/b.copc.laz"}, 'COPC', "b.copc.laz")):
         vars(dialog).update(change)
         export_points.check(dialog, None)
         check((dialog.kind, dialog.filepath) == (kind, f"/a/{name}"), f"{change}: {dialog}")
@@ -161,11 +165,12 @@ def test_export_never_writes_another_format():
     there = SCRATCH / "there.ply"
     there.write_bytes(b"kept")
     needs = exporters.NEEDS
-    exporters.NEEDS = {**needs, "e57": ("no_such_package",)}
+    exporters.NEEDS = {**needs, "e57": ("no_such_package",), "copc.laz": ("no_such_package",)}
     lacks, readers.lacks = readers.lacks, lambda *names: "no_such_package" in names
     try:
-        for name, options, text in (("scan.xyz", {}, "points cannot be written as .xyz"), ("scan.copc.laz", {}, "COPC files cannot be written"),
-                                    ("scan.las", {"kind": 'PLY'}, "does not fit the format PLY"), ("there.ply", {}, "exists"),
+        for name, options, text in (("scan.xyz", {}, "points cannot be written as .xyz"), ("scan.copc.laz", {}, "COPC needs the Python package no_such_package"),
+                                    ("scan.laz", {"kind": 'COPC'}, "Name the file .copc.laz"),
+                                    ("scan.copc.laz", {"kind": 'LAZ'}, "does not fit the format LAZ"), ("scan.las", {"kind": 'PLY'}, "does not fit the format PLY"), ("there.ply", {}, "exists"),
                                     ("there", {}, "exists"), ("there.e57", {}, "no_such_package")):
             try:
                 bpy.ops.export_scene.patina_points(filepath=str(SCRATCH / name), **options)

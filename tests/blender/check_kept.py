@@ -4,13 +4,14 @@
 import os
 import random
 import tempfile
+from contextlib import nullcontext
 from pathlib import Path
 
 import bpy
 import numpy as np
 from check_import import import_ply
 from check_linked import dense
-from harness import SCRATCH, check, new_scene, patina, render
+from harness import SCRATCH, check, new_scene, patina, read_only, render
 from patina.read.importers import library
 from patina.sync.points import built, kept, linked
 
@@ -26,27 +27,26 @@ def test_without_a_home():
     """Where Blender has no folder of user data, nothing falls into the current one."""
     honest, here, temporary = bpy.utils.user_resource, os.getcwd(), tempfile.tempdir
     work, locked = SCRATCH / "work", SCRATCH / "locked"
-    for place in (work, locked):
-        place.mkdir(exist_ok=True)
+    work.mkdir(exist_ok=True)
     os.chdir(work)
     tempfile.tempdir = str(SCRATCH)
     path = dense("homeless.ply")
     try:
-        locked.chmod(0o500)
-        for answer in ("", "/proc/nowhere/patina", *([str(locked)] if not os.access(locked, os.W_OK) else [])):
-            asked = []
-            bpy.utils.user_resource = lambda *_, answer=answer, asked=asked, **options: asked.append(options) or answer
-            found = linked.load(linked.source(path))
-            check(found.cloud.count == 20000, "loaded")
-            check(not any(options.get("create") for options in asked), "Blender prints a traceback where it cannot create a folder")
-            check(not list(work.iterdir()), f"the current folder holds {list(work.iterdir())}")
-            place = linked.source(path).kept
-            check(place.is_absolute() and place.exists() and place.parent.parent == SCRATCH, f"kept as {place}")
-            check(place.parent.stat().st_mode & 0o077 == 0, "others may look into it")
+        for answer in ("", "/proc/nowhere/patina", str(locked)):
+            with read_only(locked) if answer == str(locked) else nullcontext():
+                asked = []
+                bpy.utils.user_resource = lambda *_, answer=answer, asked=asked, **options: asked.append(options) or answer
+                found = linked.load(linked.source(path))
+                check(found.cloud.count == 20000, "loaded")
+                check(not any(options.get("create") for options in asked), "Blender prints a traceback where it cannot create a folder")
+                check(not list(work.iterdir()), f"the current folder holds {list(work.iterdir())}")
+                place = linked.source(path).kept
+                check(place.is_absolute() and place.exists() and place.parent.parent == SCRATCH, f"kept as {place}")
+                check(place.parent.stat().st_mode & 0o077 == 0, "others may look into it")
+        check(not list(locked.iterdir()), "the folder was not read-only")
     finally:
         os.chdir(here)
         bpy.utils.user_resource, tempfile.tempdir = honest, temporary
-        locked.chmod(0o700)
 
 
 def test_two_ways_of_one_file():

@@ -22,6 +22,7 @@ MODULES = {
     "materials": {"vertex_groups_as_opacity", "radii_of_point_clouds", "materials_of_geometry_nodes"},
     "motion": {"said_once"},
     "passes": {"animation", "png"},
+    "point_materials": {"linked_files_keep_their_colors", "like_cycles", "materials_by_index"},
     "roles": {"beside_cycles", "unknown_is_told_once", "light_linking_of_lamps_is_told"},
     "scans": {"scans_of_links_are_hidden", "balance_of_links", "many_stations_come_in_parts", "ptx_is_range_images", "bad_scans_of_ptx",
               "scans_survive_linking", "stations_survive_linking"},

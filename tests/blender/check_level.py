@@ -94,9 +94,32 @@ def test_an_import_offers_level():
     check(off(obj, TILT) > 16.0 and level.TILTED in obj, "one step of undo")
 
 
-def test_level_needs_points():
+def test_esc_leaves_the_tilt_unknown():
+    """Pressed while the vertical is estimated: the points are there, and nothing fails."""
     new_scene()
-    obj = add_points(room())
-    obj.patina.linked_file = "scan.ply"
+    obj, progress = add_points(turned(TILT)), Progress()
+    steps = level.note(obj, progress)
+    next(steps)
+    progress.cancel()
+    check(jobs.finish(steps) == "" and level.TILTED not in obj, "no hint")
+
+
+def test_level_needs_points():
+    """Linked clouds are leveled by the points of their files; meshes with faces, missing files and those that are read as needed are not."""
+    new_scene()
+    points = turned(TILT)
+    obj, = import_ply(write_ply("tilted.ply", [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")]), link=True)
     bpy.context.view_layer.objects.active = obj
-    check(not bpy.ops.object.patina_level.poll(), "a linked cloud")
+    check(bpy.ops.object.patina_level() == {'FINISHED'}, "linked")
+    check(off(obj, TILT) < 0.5, f"linked: {off(obj, TILT):.2f} degrees remain")
+    obj.patina.linked_file = "gone.ply"
+    before = obj.matrix_world.copy()
+    try:
+        bpy.ops.object.patina_level()
+    except RuntimeError as error:
+        check("gone.ply is missing" in str(error), str(error))
+    else:
+        check(False, "a missing file was leveled")
+    check(obj.matrix_world == before, "it moved")
+    bpy.ops.mesh.primitive_cube_add()
+    check(not bpy.ops.object.patina_level.poll(), "a mesh with faces")

@@ -3,13 +3,12 @@
 
 import os
 import time
-from functools import partial
 from pathlib import Path
 
 import bpy
 import numpy as np
 from check_import import columns, import_ply, write_ply
-from harness import SCRATCH, check, check_close, new_scene, patina, points_of, render, reports, stats
+from harness import SCRATCH, check, check_close, linear, new_scene, patina, points_of, render, reports, stats
 from mathutils import Matrix
 from patina import choices, native
 from patina.read.importers import las, library
@@ -66,6 +65,41 @@ def test_opens_from_its_cache():
     linked.load(linked.source(path))
     kept = list(SCRATCH.glob(linked.source(path).kept.name.split("-")[0] + "-*.cloud"))
     check(len(kept) == 1, f"old caches stay: {kept}")
+
+
+def test_thinned():
+    """A few points of a kept cloud, evenly chosen: each is one of the file, with its color and normal; all of them where few are there."""
+    rng = np.random.default_rng(7)
+    positions = np.unique(rng.integers(-999, 1000, (30_000, 3)), axis=0) / 1000.0  # far from where five digits are rounded
+    rng.shuffle(positions)
+    count = len(positions)
+    normals = positions / np.linalg.norm(positions, axis=1)[:, None]
+    rgb = rng.integers(1, 256, (count, 3))
+    path = write_ply("thin.ply", [(axis, "f4", positions[:, i]) for i, axis in enumerate("xyz")]
+                     + [(f"n{axis}", "f4", normals[:, i]) for i, axis in enumerate("xyz")]
+                     + [(name, "u1", rgb[:, i]) for i, name in enumerate(("red", "green", "blue"))])
+    new_scene()
+    obj, = import_ply(path, link=True)
+    source = linked.source_of(obj, 1, [])
+    place, offset = linked.saved_cloud(source)
+    known = {tuple(point): index for index, point in enumerate(np.round(positions, 5).tolist())}
+    for most, wanted in ((2000, 2000), (100_000, count), (1, 1), (0, 0)):
+        places, colors, normal, scalars = native.Cloud.start_thinning(place, offset, most).result()
+        check(len(places) == len(colors) == len(normal) == len(scalars) == wanted, f"{len(places)} of {most}")
+        at = [known.get(tuple(point), -1) for point in np.round(places.astype(np.float64) + linked.load(source).origin, 5).tolist()]
+        check(min(at, default=0) >= 0 and len(set(at)) == wanted, f"{at.count(-1)} are none of the file's, of {wanted}")
+        if wanted:
+            check_close(colors, linear(rgb[at]), 2e-6, "colors")
+            check((np.einsum("ij,ij->i", normal, normals[at]) > 0.9999).all() and np.isnan(scalars).all(), "normals, and no scalars")
+        if wanted == 2000:
+            octants = np.bincount((places > 0) @ (1, 2, 4), minlength=8)
+            check(octants.min() > 200, f"in the octants {octants}")
+    try:
+        native.Cloud.start_thinning(path, offset, 10).result()
+    except native.PatinaError as error:
+        check("thin.ply" in str(error), str(error))
+    else:
+        check(False, "a PLY file was thinned")
 
 
 def saved(name, like, origin=(0.0, 0.0, 0.0)):
@@ -131,13 +165,12 @@ def test_saved_clouds_that_are_none():
         check(path.read_bytes() == data, f"{name} is thrown away")
     obj, = import_ply(SCRATCH / "good.cloud")  # which links it, whatever is asked for
     check(obj.patina.linked_file.endswith("good.cloud"), "it is not linked")
-    for operator in (bpy.ops.object.patina_linked_to_mesh, partial(bpy.ops.export_scene.patina_points, filepath=str(SCRATCH / "out.ply"))):
-        try:
-            operator()
-        except RuntimeError as error:
-            check("can only be linked" in str(error), str(error))
-        else:
-            raise AssertionError(f"{operator} reads it")
+    try:
+        bpy.ops.export_scene.patina_points(filepath=str(SCRATCH / "out.ply"))
+    except RuntimeError as error:
+        check("cannot be read back. Use the file that it was made from" in str(error), str(error))
+    else:
+        raise AssertionError("its points were exported")
     check("100 points" in patina.read.importers.preview(SCRATCH / "good.cloud")[1], "the file dialog's preview")
 
 

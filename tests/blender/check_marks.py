@@ -2,12 +2,14 @@
 """Legends, scale bar, north arrow and title block: in the Overlay pass and burned in, without graphics."""
 
 import math
+import re
+from unittest import mock
 
 import bpy
 import numpy as np
 from check_color import scene_of_numbers
-from harness import check, check_close, render
-from mathutils import Euler
+from harness import add_points, check, check_close, new_scene, points_of, render
+from mathutils import Euler, Matrix
 from patina import native
 from patina.draw import marks as painting
 from patina.sync.view import marks
@@ -65,6 +67,33 @@ def test_legend_of_a_ramp():
     scene.patina.marks.burn = True
     burned, overlay = pictures(scene, "burned")
     check_close(burned, overlay + plain * (1 - overlay[..., 3:]), 1e-5, "burned in is the overlay over the image")
+
+
+def test_legend_of_automatic_ranges():
+    """The values at the ends are those that images take, in the scene's units; they color the lowest and the highest points."""
+    scene = new_scene(64, 48)
+    scene.unit_settings.system, scene.unit_settings.scale_length = 'METRIC', 1.0
+    obj = add_points(np.random.default_rng(4).uniform((-0.5, -0.5, -4.0), (0.5, 0.5, -2.0), (500, 3)), matrix=Matrix.Translation((0.0, 0.0, -1.0)) @ Matrix.Scale(2.0, 4))
+    colors = obj.patina.colors
+    colors.use_legend, colors.ramp = True, 'GREY'
+    places = points_of(obj)
+    world = places * 2.0 + (0.0, 0.0, -1.0)
+    for source, values in (('HEIGHT', world[:, 2]), ('OBJECT_HEIGHT', places[:, 2]), ('DISTANCE', np.linalg.norm(world, axis=1))):
+        colors.source = source
+        found = []
+        with mock.patch.object(painting, "paint", side_effect=lambda marks, *size: found.append(marks) or np.zeros((size[1], size[0], 4), np.float32)):
+            pictures(scene, f"automatic_{source}")
+        legend, = found[0].legends
+        texts = [text for _, text in legend.ticks]
+        check(texts and all(re.fullmatch(r"-?[\d,.]+", text) for text in texts), f"{source}: {legend.title} {texts}")
+        check(re.search(r"\((m|cm|mm)\)$", legend.title), legend.title)
+        meters = {"m": 1.0, "cm": 0.01, "mm": 0.001}[legend.title.rpartition("(")[2][:-1]]
+        shares, shown = np.array([place for place, _ in legend.ticks]), np.array([float(text.replace(",", "")) for text in texts]) * meters
+        size = 2.0 if source == 'OBJECT_HEIGHT' else 1.0
+        if len(shown) > 1:  # places and values are on a line from the least to the most
+            slope, zero = np.polyfit(shares, shown, 1)
+            near = 0.2 if source == 'DISTANCE' else 0.01  # distances end at corners of boxes
+            check_close((zero, zero + slope), (values.min() * size, values.max() * size), near * slope, f"{source}: values at the ends")
 
 
 def test_legend_of_classes():
@@ -138,3 +167,48 @@ def test_north_and_title():
     check(overlay[:100, 320:, 3].any() and not overlay[:, :320].any(), "the title is at the lower right")
     size = painting.line("I", 20.0).shape[1]
     check(painting.line("IIII", 20.0).shape[1] > 2 * size and painting.line("\u4e2d", 20.0).any(), "letters beyond Latin-1 become ?")
+
+
+def test_measurements_in_renders():
+    """In the Overlay pass their lines join the pixels of their points, also of a border, and are cut at the near clip; hidden ones are not there."""
+    scene = new_scene(400, 300)
+    obj = add_points([(-1.0, 0.5, -6.0), (1.0, -0.5, -6.0), (0.0, 0.0, 5.0)])
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.patina_add_measurement(kind='DISTANCE', coordinates="-1 0.5 -6  1 -0.5 -6", space='OBJECT')
+    scene.render.image_settings.color_mode = 'RGBA'
+    _, overlay = pictures(scene, "measures_off")
+    check(not overlay.any(), "measurements that nobody asked for")
+    scene.patina.marks.use_measures = True
+    focal = 400 * 50 / 36 / 6
+    ends = np.array([(200 - focal, 150 + 0.5 * focal), (200 + focal, 150 - 0.5 * focal)])
+
+    def off_line(found):
+        """Pixels from the line through both ends."""
+        x, y = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        return np.abs(x * (found[:, 1] - ends[0, 1]) - y * (found[:, 0] - ends[0, 0]))
+
+    def lit(overlay):
+        return np.argwhere((overlay[..., 0] > 0.5) & (overlay[..., 2] < 0.2))[:, ::-1] + 0.5
+
+    _, overlay = pictures(scene, "measures")
+    found, along = lit(overlay), ends[1] - ends[0]
+    across = off_line(found)
+    share = (found - ends[0]) @ along / (along @ along)
+    check(len(found) > 150 and across.max() < 4.0, f"{len(found)} pixels, {across.max()} off the line")
+    check(abs(share.min()) < 0.02 and abs(share.max() - 1.0) < 0.02, f"from {share.min()} to {share.max()}")
+    check((overlay[..., :3].min(axis=2) > 0.6).sum() > 20, "no value is written")
+    scene.render.use_border, scene.render.border_min_x, scene.render.border_max_x = True, 0.25, 0.75
+    scene.render.border_min_y, scene.render.border_max_y = 0.25, 0.75
+    _, part = pictures(scene, "measures_border")
+    if part.shape == overlay.shape:
+        part = part[75:225, 100:300]
+    found = lit(part) + (100, 75)
+    check(len(found) > 50 and off_line(found).max() < 4.0, "of a border: off the line")
+    scene.render.use_border = False
+    bpy.ops.object.patina_add_measurement(kind='DISTANCE', coordinates="0 0 -6  0 0.5 20", space='OBJECT')  # the second is behind the camera
+    _, behind = pictures(scene, "measures_behind")
+    check(np.isfinite(behind).all() and behind[160:, 195:206, 3].any(), "the part before the camera")
+    for entry in obj.patina.measures.entries:
+        entry.hide = True
+    _, overlay = pictures(scene, "measures_hidden")
+    check(not overlay.any(), "hidden ones")

@@ -4,7 +4,8 @@
 import contextlib
 
 import bpy
-from harness import SCRATCH, add_points, check, new_scene, render, reports
+import numpy as np
+from harness import REPOSITORY, SCRATCH, add_points, check, new_scene, render, reports
 from patina import migrate
 
 CURRENT = len(migrate.STEPS)
@@ -87,3 +88,22 @@ def test_a_newer_file_is_said():
     add_points([(0, 0, -4)])
     render()
     check(any("newer version of Patina" in text for _, text in reports), f"{reports}")
+
+
+def test_files_of_older_addons():
+    """Written by old commits: tests/files/compatibility/README.md. They keep their look, and render."""
+    for number in range(3):
+        path = SCRATCH / f"settings-{number}.blend"
+        path.write_bytes((REPOSITORY / "tests/files/compatibility" / path.name).read_bytes())
+        scene = load(str(path))
+        settings, points = scene.patina, scene.objects["points"]
+        check(scene.render.engine == 'PATINA' and settings.version == CURRENT, f"{number}: version {settings.version}")
+        check(settings.is_property_set("samples") and settings.samples == 1, f"{number}: one sample was the default")
+        check(settings.is_property_set("meshes") == (number == 0) and (settings.meshes == 'OFF') == (number == 0), f"{number}: {settings.meshes}")
+        check("hide_stray" not in (migrate._stored(points) or {}), f"{number}: the switch of strays is still there")
+        planes = render()
+        combined = planes["Combined"]
+        check(combined.shape[:2] == (64, 96), f"{combined.shape}")
+        color = combined[32, 30, :3]
+        check(combined[32, 30, 3] == 1.0 and np.allclose(color, [1.0, 0.214, 0.0513], atol=0.01), f"{number}: {color}")
+        check((combined[32, 88, 3] > 0.0) == (number > 0), f"{number}: the mesh is drawn from version 1 on")

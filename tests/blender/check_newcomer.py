@@ -4,13 +4,14 @@ yield means; PATINA_SCREENSHOTS names a folder that keeps the pictures."""
 
 import os
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import bpy
 import numpy as np
 from harness import REPOSITORY, SCRATCH, Skip, check, saved
-from patina.operators import set_up
-from window import area, invoke_import, pause, screenshot, shown, whole_window, window_region
+from patina.operators import samples, set_up
+from window import area, invoke_import, pause, screenshot, shown, view, whole_window, window_region
 
 POINTS = int(os.environ.get("PATINA_NEWCOMER_POINTS", "20000"))
 
@@ -82,10 +83,28 @@ def test_newcomers_path():
     check(abs(columns.mean() - 960) < 150 and abs(rows.mean() - 540) < 150, "the points are not in the middle")
 
 
+def test_a_sample_opens_rendered():
+    """Blender asks to save a changed file first. Then the view shows the sample's points, through its camera."""
+    options = {"filepath": str(samples.path_of("Relief")), "load_ui": True, "use_splash": False}
+    bpy.context.scene.name = "mine"
+    bpy.ops.ed.undo_push()  # changed
+    check(bpy.data.is_dirty and bpy.context.preferences.view.use_save_prompt, "nothing to ask for")
+    check(in_view(partial(bpy.ops.wm.read_homefile, 'INVOKE_AREA'), **options) == {'INTERFACE'}, "Blender did not ask")
+    yield pause(0.5)
+    check("mine" in bpy.data.scenes, "the changes are lost")
+    in_view(bpy.ops.wm.read_homefile, **options)
+    yield lambda: area().spaces[0].shading.type == 'RENDERED' and shown() is not None
+    screenshot("sample_relief")
+    check(shown().shown.stats["points"] == len(bpy.data.objects["Relief"].data.vertices), "points")
+    check(view().view_perspective == 'CAMERA' and bpy.data.filepath == "", "camera or file")
+    in_view(bpy.ops.wm.read_homefile, use_factory_startup=True, use_empty=False, app_template="", load_ui=True)
+    yield lambda: "Cube" in bpy.data.objects
+
+
 # Where Blender 3.4 puts things in a window of 1280 x 800 as it comes, from the top left; dialogs have windows of their own.
 MENU_FILE, MENU_IMPORT, MENU_POINTS = (46, 13), (80, 295), (350, 546)
 DIALOG_FILE, DIALOG_IMPORT = (312, 78), (1031, 603)
-RENDERED, RENDER_TAB, STYLE, MUSEUM = (1017, 40), (1074, 354), (1168, 468), (787, 170)
+RENDERED, RENDER_TAB, STYLE, MUSEUM = (1017, 40), (1074, 354), (1168, 468), (913, 170)
 MOST_CLICKS = 16
 
 

@@ -129,6 +129,14 @@ def test_no_tooltip_speaks_of_zero():
     check(not found, f"{found}")
 
 
+def test_tooltips_of_operators_are_whole():
+    """Blender 3.4 cuts an operator's description after 239 bytes, without a sign."""
+    found = [cls for cls in bpy.types.Operator.__subclasses__() if cls.__module__.startswith("patina.")]
+    check(len(found) > 50, f"{len(found)} operators")
+    long = [f"{cls.__name__}: {len(text)}" for cls in found if len(text := (cls.__doc__ or "").encode()) > 239]
+    check(not long, f"{long}")
+
+
 # ---- panels, drawn into a list -----------------------------------------------------------------------------------
 
 
@@ -212,6 +220,28 @@ def test_first_lines():
         panel = next(cls for cls in found if cls.bl_label == "Points")
         names = [name for _, owner, name, _ in drawn_by(panel, context_of(obj)) if owner is not None]
         check(names == ["ramp", "opacity", "lighting", "use_radius", "radius", "radius", "use_least_trust", "use_clips"], f"{place}: {names}")
+
+
+def test_first_lines_offer_light():
+    """Lit points that no light reaches: both panels say so, above a button that adds one. With its light, the two lines are gone."""
+    scene = new_scene()
+    scene.world = None
+    obj = add_points([(0, 0, -4)])
+    button = ("operator", "scene.patina_add_light", "")
+
+    def offers(place):
+        """Whether the sentence, in one line or broken, stands right above the button."""
+        panel = next(cls for cls in panels() if cls.bl_label == "Points" and (cls.bl_space_type, getattr(cls, "bl_context", "")) == place)
+        lines = [(kind, name, text) for kind, owner, name, text in drawn_by(panel, context_of(obj)) if kind in {"label", "operator"}]
+        above = lines[:lines.index(button)] if button in lines else []
+        return " ".join(text for kind, _, text in above if kind == "label").endswith("No light reaches this cloud")
+
+    places = (('VIEW_3D', ""), ('PROPERTIES', "object"))
+    for lighting, wanted in (('UNLIT', False), ('LIT', True)):
+        obj.patina.lighting = lighting
+        check([offers(place) for place in places] == [wanted] * 2, f"{lighting}: {[offers(place) for place in places]}")
+    check(bpy.ops.scene.patina_add_light() == {'FINISHED'}, "the button")
+    check(not any(offers(place) for place in places), "with a light")
 
 
 def test_first_lines_are_of_points():

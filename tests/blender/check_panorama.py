@@ -9,8 +9,9 @@ import check_linked  # noqa: F401  no test leaves files with the user
 import numpy as np
 from check_import import import_ply as import_points
 from check_motion import make_linear
-from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, new_scene, render, sphere
+from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, failing_render, new_scene, render, sphere
 from mathutils import Euler
+from patina import memory, native
 from patina.operators import scanner
 from patina.read import importers
 from patina.sync.analyses.analysis import SCANNERS
@@ -88,6 +89,21 @@ def test_fog_is_round():
     effects.use_fog, effects.fog_start, effects.fog_end, effects.fog_density = True, 1.0, 3.0, 0.8
     effects.fog_use_color, effects.fog_color = True, (0.0, 0.5, 1.0)
     check_close(render()["Combined"][..., :3] - (0.6, 0.8, 1.0), 0.0, 0.01, "half way through the fog")
+
+
+def test_faces_that_do_not_fit():
+    """Six faces and what they are joined to that are larger than the free memory are refused before any of them is drawn."""
+    stage(256, 128)
+    add_points([place(0, 0, 4.0)] * 3)
+    drawn, honest, free = [], native.Frame.render, memory.free
+    native.Frame.render = lambda self, scene: drawn.append(scene) or honest(self, scene)
+    memory.free = lambda: 500_000
+    try:
+        message = failing_render()
+    finally:
+        native.Frame.render, memory.free = honest, free
+    check("the panorama, with its six faces, needs" in message and not drawn, f"{message}, {len(drawn)} drawn")
+    render()
 
 
 def test_samples_and_motion():

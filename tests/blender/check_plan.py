@@ -3,8 +3,9 @@
 
 import bpy
 import numpy as np
+from check_survival import full_disk
 from harness import SCRATCH, add_points, check, check_close, new_scene
-from patina.operators import plan, view_transform
+from patina.operators import images_to_scale, plan, view_transform
 
 
 def picture_of(path):
@@ -49,7 +50,7 @@ def test_plan_restores_the_scene():
     bpy.context.view_layer.update()
 
     def state():
-        return (scene.camera, [getattr(scene.render, name) for name in plan._RESTORED], scene.render.filepath,
+        return (scene.camera, [getattr(scene.render, name) for name in images_to_scale.RESTORED],
                 scene.render.image_settings.file_format, len(bpy.data.objects), len(bpy.data.cameras))
     before, path = state(), SCRATCH / "restored.png"
     bpy.ops.render.patina_plan(filepath=str(path), scale=100.0, dpi=254.0, margin=0.0)
@@ -75,7 +76,7 @@ def test_plan_fits_the_sheet():
 
 def test_plan_refuses():
     new_scene()
-    for part, options in (("select objects", {}), ("the most is", {"scale": 0.001})):
+    for part, options in (("select objects", {}), ("The most is", {"scale": 0.001})):
         if options:
             add_points([(0, 0, 0), (100, 100, 1)]).select_set(True)
             bpy.context.view_layer.update()
@@ -87,6 +88,23 @@ def test_plan_refuses():
             check(False, f"no refusal for {options}")
 
 
+def test_world_file_on_a_full_disk():
+    """One message, and the world file of before."""
+    new_scene()
+    add_points([(0, 0, 0), (10, 10, 1)]).select_set(True)
+    bpy.context.view_layer.update()
+    target = SCRATCH / "full.pgw"
+    target.write_text("before")
+    try:
+        with full_disk():
+            bpy.ops.render.patina_plan(filepath=str(SCRATCH / "full.png"), write_picture=False)
+    except RuntimeError as error:
+        check("full.pgw cannot be written: File too large" in str(error), str(error))
+    else:
+        check(False, "it was written")
+    check(target.read_text() == "before" and [path.name for path in SCRATCH.glob("full.pgw*")] == ["full.pgw"], f"{list(SCRATCH.glob('full*'))}")
+
+
 def test_view_transform_hint():
     scene = new_scene()
     scene.view_settings.view_transform = 'Filmic'
@@ -96,5 +114,6 @@ def test_view_transform_hint():
 
 
 def test_world_file():
-    lines = plan.world_file(1000.0, 2000.0, 0.5).split()
+    frame = plan.frame_of((np.zeros(3), np.array((5.0, 3.0, 1.0))), 0.5, 0.0)
+    lines = images_to_scale.world_file(frame, *frame.size(), np.array((1000.0, 1997.0, 0.0))).split()
     check([float(line) for line in lines] == [0.5, 0, 0, -0.5, 1000.25, 1999.75], f"{lines}")

@@ -2,8 +2,10 @@
 """The add-on's preferences: readers of LAZ and E57 from files and by pip, the cache, defaults of device, threads and memory."""
 
 import contextlib
+import hashlib
 import importlib
 import importlib.machinery
+import importlib.util
 import io
 import shutil
 import subprocess
@@ -165,6 +167,7 @@ def test_readers_that_do_not_fit():
 def test_readers_by_pip():
     """What pip fetches is installed; what pip says is said; a package without a wheel leaves the others; Esc ends it."""
     made = wheel("patina_try_d", "fetched")
+    every = (REPOSITORY / "addon/readers.txt").read_text("utf-8").split()
     (SCRATCH / "pip.py").write_text(
         "import shutil, sys\nargs = sys.argv\nassert 'download' in args and '--no-deps' in args\n"
         "if 'laspy==' not in args[-1]: sys.exit(f'ERROR: No matching distribution found for {args[-1]}')\n"
@@ -177,7 +180,13 @@ def test_readers_by_pip():
     try:
         with without_readers("patina_try_d"):
             operators.PIP = [sys.executable, str(SCRATCH / "pip.py")]
-            bpy.ops.patina.install_readers()
+            with mock.patch.object(readers, "wanted", lambda: every[:2]):
+                fails(f"pip fetched {made.name}, which is none of the files", bpy.ops.patina.install_readers)
+                with mock.patch.object(readers, "_sums", lambda: {made.name: 64 * "0"}):
+                    fails("its checksum differs", bpy.ops.patina.install_readers)
+                check(readers.missing() == ["patina_try_d"], "installed in spite of its checksum")
+                with mock.patch.object(readers, "_sums", lambda: {made.name: hashlib.sha256(made.read_bytes()).hexdigest()}):
+                    bpy.ops.patina.install_readers()
             import patina_try_d
             check(patina_try_d.ANSWER == 42, "not there")
         with without_readers("patina_try_e"):
@@ -186,8 +195,7 @@ def test_readers_by_pip():
             fails("Install from Files", bpy.ops.patina.install_readers)
             (SCRATCH / "no_wheel.py").write_text("import sys\nsys.exit('ERROR: No matching distribution found for ' + sys.argv[-1])\n")
             operators.PIP = [sys.executable, str(SCRATCH / "no_wheel.py")]
-            fails(f"PyPI has no wheel of laspy==2.7.0, lazrs==0.8.2, pye57==0.4.19, pyquaternion==0.9.9 for Python 3.{sys.version_info[1]}",
-                  bpy.ops.patina.install_readers)
+            fails(f"PyPI has no wheel of {', '.join(every)} for Python 3.{sys.version_info[1]}", bpy.ops.patina.install_readers)
             fails("Convert LAZ files to LAS", bpy.ops.patina.install_readers)
             (SCRATCH / "no_net.py").write_text("import sys\nprint('WARNING: Retrying (Retry(total=4))')\nsys.exit('ERROR: No matching distribution found')\n")
             operators.PIP = [sys.executable, str(SCRATCH / "no_net.py")]
@@ -196,7 +204,7 @@ def test_readers_by_pip():
             steps = readers.download(SCRATCH, [sys.executable, str(SCRATCH / "slow_pip.py")])
             told.append(next(steps))
             steps.close()  # as Esc does: pip is waited for no longer
-            check("0 of 4" in told[0], f"{told}")
+            check(f"0 of {len(every)}" in told[0], f"{told}")
     finally:
         operators.PIP = None
 
@@ -267,17 +275,44 @@ def test_cache_folder_size_and_clear():
         count, size = cache.held()
         check(count == 1 and size > 20000 * 10, f"{count} {size}")
         check(operators.cache_text() == "1 kept, 0.00 GB", operators.cache_text())
-        bpy.ops.patina.clear_cache()
+        bpy.ops.patina.remove_caches(points=False)
         check(not list(mine.iterdir()) and cache.held() == (0, 0), f"{list(mine.iterdir())}")
         (mine / "mine.txt").write_text("stays")
         render()
         check(len(list(mine.glob("*.cloud"))) == 1, "it is made anew")
-        bpy.ops.patina.clear_cache()
+        bpy.ops.patina.remove_caches(points=False)
         check((mine / "mine.txt").is_file(), "somebody else's file is gone")
         chosen.cache_limit = 1
         check(choices.cache_bytes() == 1 << 30, "the limit")
     check(kept.folder() != mine and choices.cache_bytes() == 32 << 30, "defaults hold without")
     check(linked.source(SCRATCH / "kept.ply").kept.parent != mine, "linked clouds follow")
+
+
+def test_remove_caches_lists_and_deletes():
+    """Each kind of file with its folder and size; installed readers only on request."""
+    mine, packages = SCRATCH / "stored", SCRATCH / "installed"
+    readers_folder = choices.readers_folder
+    choices.readers_folder = lambda: packages / "cp3"
+    try:
+        with enabled() as chosen:
+            chosen.cache_folder = str(mine)
+            new_scene()
+            import_ply(dense("stored.ply"), link=True)
+            (packages / "cp3/laspy").mkdir(parents=True)
+            (packages / "cp3/laspy/__init__.py").write_bytes(b"# ours\n")
+            stored = operators._stored()
+            check({name: entry[:2] for name, entry in stored.items()} == {"clouds": (mine, 1), "points": (mine / "pages", 0), "packages": (packages, 1)}, f"{stored}")
+            check(stored["packages"][2] == 7 and stored["clouds"][2] > 200_000, f"{stored}")
+            layout = mock.MagicMock()
+            operators.PATINA_OT_remove_caches.draw(SimpleNamespace(layout=layout, _stored=stored), None)
+            shown = str(layout.mock_calls)
+            check(str(mine) in shown and str(packages) in shown and "1 file, 0.00 GB" in shown, shown)
+            bpy.ops.patina.remove_caches()
+            check(not list(mine.glob("*.cloud")) and packages.is_dir(), "the caches, and nothing else")
+            bpy.ops.patina.remove_caches(clouds=False, points=False, packages=True)
+            check(not packages.exists(), "the packages")
+    finally:
+        choices.readers_folder = readers_folder
 
 
 def test_defaults_of_device_threads_and_memory():
@@ -323,3 +358,16 @@ def test_a_newer_blender_is_told_of():
             preferences.PatinaPreferences.draw(drawn, context_of())
         labels = [text for kind, _, _, text in layout.drawn if kind == "label"]
         check(versions.notice() in " ".join(labels), f"the preferences: {labels}")
+
+
+def test_a_blender_without_numpy_is_told_of():
+    """Debian's package of Blender brings no numpy. Enabling then ends with one message that says what to install."""
+    place = REPOSITORY / "addon/__init__.py"
+    found = importlib.util.spec_from_file_location("patina_alone", place, submodule_search_locations=[str(place.parent)])
+    with mock.patch.dict(sys.modules, {"numpy": None}):
+        try:
+            found.loader.exec_module(importlib.util.module_from_spec(found))
+            said = "it was enabled"
+        except ImportError as error:
+            said = str(error)
+    check(said.startswith("Patina needs numpy") and "sudo apt install python3-numpy" in said, said)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from harness import Skip, add_points, check, check_soon, drawn, failing_render, new_scene, patina, render, reports, sphere
+from harness import Skip, add_points, check, drawn, failing_render, new_scene, patina, render, reports, sphere
 from patina import jobs, native
 from patina.draw import engine, passes
 from patina.draw import render as drawing
@@ -33,24 +33,26 @@ def test_break_writes_nothing():
 
 
 def test_cancel_while_building():
-    """A big cloud stops soon, and the error is the one of cancelling."""
+    """A big cloud stops soon: no more than a quarter of the work follows, in the median of five. The error is the one of cancelling."""
     positions = np.random.default_rng(5).uniform(-1, 1, (2_000_000, 3)).astype(np.float32)
 
-    def attempt():
-        asked = []
+    begun, late = time.process_time(), []
+    native.Cloud(positions).close()
+    whole = time.process_time() - begun
+    for _ in range(5):
+        cancels = []
         with native.Progress() as progress:
 
-            def cancel():
-                asked.append(time.perf_counter())
+            def cancel(progress=progress, cancels=cancels):
                 progress.cancel()
+                cancels.append(time.process_time())
 
             try:
-                jobs.run(lambda: native.Cloud(positions, progress=progress), cancel, lambda: True)
+                jobs.run(lambda progress=progress: native.Cloud(positions, progress=progress), cancel, lambda: True)
+                raise AssertionError("a cancelled build returned a cloud")
             except native.PatinaCancelled:
-                return time.perf_counter() - asked[0]
-        check(False, "a cancelled build returned a cloud")
-
-    check_soon(attempt, 0.5)
+                late.append(time.process_time() - cancels[0])
+    check(sorted(late)[2] < 0.25 * whole, f"{late} of {whole:.2f} s of a processor")
 
 
 def test_cancel_before_rendering():
@@ -182,12 +184,12 @@ def test_memory_runs_short():
     before = resource.getrlimit(resource.RLIMIT_AS)
     held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     scene.render.resolution_percentage = 100
-    resource.setrlimit(resource.RLIMIT_AS, (held + (400 << 20), before[1]))  # planes of such a picture take 1.5 GB
+    resource.setrlimit(resource.RLIMIT_AS, (held + (250 << 20), before[1]))  # its planes take 1.5 GB, tiles less; the image itself 230 MB
     try:
         text = failing_render()
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
-    check("out of memory" in text, text)
+    check("out of memory" in text and "Error:" not in text.partition("Patina: ")[2], text)
     scene.render.resolution_percentage = 1
     check(drawn(render()), "nothing was drawn afterwards")
 

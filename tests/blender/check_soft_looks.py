@@ -56,6 +56,17 @@ def test_vegetation_lets_through():
     check(again[12:36, 4:26].min() > 0.8, "another style has no soft points")
 
 
+def test_above_ground_lets_through():
+    """What is higher than half a meter above the ground lets the wall behind it through; what is lower stands."""
+    left, right = (wall(-3.0, high=(0.0, 1.0)), RED), (wall(-3.0, low=(0.0, -1.0)), RED)
+    _, obj = stage(left, right, (wall(-5.0, 4.0), BLUE))
+    heights = np.concatenate([np.full(len(left[0]), 3.0), np.full(len(right[0]), 0.2), np.zeros(len(obj.data.vertices) - len(left[0]) - len(right[0]))])
+    obj.data.attributes.new("height_above_ground", 'FLOAT', 'POINT').data.foreach_set("value", heights.astype(np.float32))
+    shown = redness(styled("above_ground"))
+    check(shown[12:36, 4:26].max() < 0.85 and shown[12:36, 4:26].min() > 0.02, f"high: {shown[24, 4:26]}")
+    check(shown[12:36, 38:60].min() > 0.9, f"low: {shown[24, 38:60]}")
+
+
 def test_xray_walls_add_up():
     """One, two and three walls behind one another: each is seen through the others."""
     scene, _ = stage((wall(-3.0), RED), (wall(-4.0, 4.0, low=(-1.0, -1.0), high=(0.2, 1.0)), RED),

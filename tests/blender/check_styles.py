@@ -32,6 +32,7 @@ def stage(side=SIDE):
     points, normals, colors = sample.points(POINTS)
     obj = add_points(points, colors, normals)
     obj.data.attributes.new("classification", 'INT', 'POINT').data.foreach_set("value", sample.classes(POINTS).astype(np.int32))
+    obj.data.attributes.new("height_above_ground", 'FLOAT', 'POINT').data.foreach_set("value", np.ascontiguousarray(points[:, 2]))
     bpy.context.view_layer.objects.active = obj
     set_world((0.2, 0.2, 0.2))
     return scene, obj
@@ -300,6 +301,11 @@ def test_styles_say_what_is_missing():
     other.data.attributes.new("plants", 'INT', 'POINT')
     other.patina.colors.class_attribute = "plants"
     check(shown() == plain, "another cloud has classes")
+    obj.data.attributes.remove(obj.data.attributes["height_above_ground"])
+    found = shown()
+    check({key: found[key][0] for key in found if found[key] != plain[key]} == {"above_ground": "Above Ground (No Ground)"}, f"{found}")
+    other.data.attributes.new("height_above_ground", 'FLOAT', 'POINT')
+    check(shown() == plain, "another cloud has heights")
     obj.patina.analysis = other.patina.analysis = 'OFF'
     found = shown()
     check({key: found[key][0] for key in found if found[key] != plain[key]} ==

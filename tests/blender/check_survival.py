@@ -7,7 +7,7 @@ import os
 import random
 import shutil
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from unittest import mock
 
 import bpy
@@ -18,7 +18,7 @@ from check_import import import_ply
 from check_kept import forget
 from check_linked import dense
 from check_preferences import enabled
-from harness import SCRATCH, Skip, check, forget_files, new_scene, render
+from harness import SCRATCH, Skip, check, forget_files, new_scene, read_only, render
 from patina.read import importers
 from patina.styles import styles
 from patina.sync.points import edits, files, linked
@@ -138,20 +138,20 @@ def test_cache_folder_goes():
         check((wanted["Combined"][..., 3] > 0).any(), "nothing is drawn")
         check(any(folder.glob("*.cloud")), "kept elsewhere")
         shutil.rmtree(folder)
-        for case in ("deleted", "a file", "read-only", "nowhere"):
+        for case in ("deleted", "a file", "nowhere", "read-only"):
             forget()
             if case == "a file":
                 shutil.rmtree(folder, ignore_errors=True)
                 folder.write_bytes(b"x")
-            elif case == "read-only":
-                folder.unlink(missing_ok=True)
-                folder.mkdir(exist_ok=True)
-                folder.chmod(0o500)
             elif case == "nowhere":
-                folder.chmod(0o700)
                 chosen.cache_folder = "/proc/nowhere/patina"
-            picture = render()
+            elif case == "read-only":
+                folder.unlink()
+                chosen.cache_folder = str(folder)
+            with read_only(folder) if case == "read-only" else nullcontext():
+                picture = render()
             check(all(np.array_equal(picture[name], pixels) for name, pixels in wanted.items()), case)
+        check(not any(folder.iterdir()), "the folder was not read-only")
 
 
 @contextmanager

@@ -296,7 +296,7 @@ def test_none_is_trusted():
 # ---- saved clouds of older versions ------------------------------------------------------------------------------------
 
 _MASK = (1 << 64) - 1
-_TODAY, _UNTRUSTED = 14, 12  # versions of saved clouds: native/scene/cloud_store.c
+_TODAY, _UNTRUSTED = 14, 12  # versions of saved clouds: native/scene/clouds/cloud_store.c
 _TAIL, _UNTRUSTED_TAIL = 24 + 136, 24  # bytes of their headers behind the check sum
 
 

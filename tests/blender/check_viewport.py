@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 from check_combine import hide_each_other
+from check_point_materials import Tree
 from check_world import image_of, sky, world_with
 from harness import add_light, add_points, check, check_close, render, sphere
 from mathutils import Matrix, Quaternion
@@ -412,6 +413,27 @@ def test_clips_and_ramps_follow():
     yield lambda: newer(pictures)() and np.median(shown().shown.color[half], axis=0)[2] > 0.999  # each stop is a change
     check_close(np.median(shown().shown.color[half], axis=0), (0, 0, 1, 1), 1e-4, "painted blue")
     check(shown().trusted.reads == reads, "the points were not read again")
+
+
+def test_material_nodes_follow():
+    """A viewport shows the colors of nodes; an edited node shows at once, and the cloud is not built again."""
+    setup()
+    obj = add_points(sphere(60000, 1.5, (0, 0, 0))[0])
+    obj.patina.lighting = 'UNLIT'
+    tree = Tree(obj)
+    value = tree.node('ShaderNodeRGB').outputs[0]
+    value.default_value = (0.0, 0.0, 1.0, 1)
+    tree.color(value)
+    yield lambda: settled(60000)
+    found = shown()
+    cloud, reads, pictures, there = found.shown.clouds[0].cloud, found.trusted.reads, found.pictures, found.shown.color[..., 3] > 0
+    check_close(np.median(found.shown.color[there], axis=0)[:3], (0, 0, 1), 1e-3, "blue")
+    value.default_value = (1.0, 0.0, 0.0, 1)
+    yield lambda: newer(pictures)() and np.median(shown().shown.color[there], axis=0)[0] > 0.999
+    check(shown().trusted.reads == reads + 1, f"{shown().trusted.reads - reads} reads of one change")
+    check(shown().shown.clouds[0].cloud is cloud, "the cloud is recolored")
+    tree.set(tree.surface.inputs["Base Color"], tree.node('ShaderNodeAmbientOcclusion').outputs["Color"])
+    yield lambda: shown() and any("'Ambient Occlusion' (Ambient Occlusion) cannot be evaluated" in text for text in shown().notices)
 
 
 def test_holdouts_and_catchers():

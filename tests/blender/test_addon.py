@@ -18,13 +18,13 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parent.parent)]
 
 MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "check_layers", "check_shadows", "check_final",
-           "check_samples", "check_plan", "check_color", "check_marks", "check_clip", "check_panels", "check_styles", "check_import", "check_formats",
+           "check_samples", "check_plan", "check_drawings", "check_color", "check_marks", "check_measure", "check_clip", "check_panels", "check_styles", "check_import", "check_formats",
            "check_linked", "check_building", "check_copc", "check_pages", "check_ept", "check_edits", "check_files", "check_places",
            "check_preferences", "check_set_up",
            "check_sequence", "check_motion", "check_panorama", "check_migrate", "check_meshes", "check_textures", "check_combine",
            "check_clouds", "check_session", "check_effects", "check_lines", "check_splats", "check_pace", "check_analysis", "check_edit_mode", "check_trust",
-           "check_losses", "check_roles", "check_kept", "check_survival", "check_world", "check_materials", "check_nodes", "check_cryptomatte",
-           "check_level", "check_soft", "check_soft_looks", "check_scans", "check_grids", "check_newcomers", "check_kinds", "check_farm",
+           "check_losses", "check_roles", "check_kept", "check_survival", "check_world", "check_materials", "check_nodes", "check_point_materials", "check_point_patterns", "check_cryptomatte",
+           "check_level", "check_compare", "check_animation", "check_view_from_here", "check_soft", "check_soft_looks", "check_scans", "check_grids", "check_newcomers", "check_kinds", "check_farm", "check_sample_scenes",
            "check_security", "check_gpu")  # the last: with graphics in the background others would have them too
 # Of files, servers and processes beside Blender, or of pictures that the library alone decides: how the names begin.
 ONCE = ("analysis/once", "building/", "copc/", "ept/", "formats/", "kept/", "survival/", "linked/opens_from_its_cache", "pages/", "samples/panoramas_sample_by_sample",
@@ -33,7 +33,7 @@ ONCE = ("analysis/once", "building/", "copc/", "ept/", "formats/", "kept/", "sur
 # that is quicker.
 SLOW = ("analysis/beside", "analysis/cancel", "analysis/final_takes_over", "analysis/once",
         "building/cancelled_and_cut", "building/killed", "building/no_room_to_analyze", "building/same_files", "building/same_ply",
-        "building/two_at_once", "effects/contour", "farm/farm_draws_frames", "farm/farm_draws_tiles", "kept/damage_is_found",
+        "building/two_at_once", "effects/contour", "farm/farm_draws_frames", "farm/farm_draws_tiles", "farm/three_build_one_cloud_at_once", "kept/damage_is_found",
         "linked/opens_from_its_cache", "losses/farm_learns_of_it", "preferences/readers_by_pip", "preferences/real_readers_from_files",
         "roles/beside_cycles", "roles/shadow_catcher", "samples/panoramas_sample_by_sample", "styles/save_and_load",
         "styles/shipped_files_say_just_what_differs", "styles/thumbnails_are_of_today", "textures/opacity",

@@ -60,10 +60,14 @@ def tests():
     import check_newcomer
     import check_overlays
     import check_thinned
+    import check_view_compare
     import check_view_copc
+    import check_view_drawings
     import check_view_edits
     import check_view_marks
+    import check_view_measure
     import check_view_trust
+    import check_view_walk
     import check_viewport
     import check_viewport_life
     import check_viewport_samples
@@ -88,7 +92,7 @@ def tests():
         yield "frames", frame_figures.frame_figures
         return
     modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_thinned, check_drawn,
-               check_drop, check_cloud_edits, check_view_copc, check_view_edits, check_view_marks, check_view_trust, check_newcomer)
+               check_drop, check_cloud_edits, check_view_copc, check_view_edits, check_view_marks, check_view_compare, check_view_measure, check_view_drawings, check_view_trust, check_view_walk, check_newcomer)
     known = {name.removeprefix("test_"): test for module in modules for name, test in vars(module).items() if name.startswith("test_")}
     wrong = sorted((ONCE | DRAWN | ALONE) - set(known))
     assert not wrong, f"lists of test_window.py: no test is called {', '.join(wrong)}"

@@ -67,6 +67,14 @@ def commands():
             "keys": (("scatter", "good.cloud", "-o", "out.keys", "--part", "1/2", *SMALL), "out.keys")}
 
 
+# Files that are never read again.
+def reports():
+    section = ("--plane", "section:0,0.4,2,0.4", "--scale", "20")
+    return {"distances": (("distance", "scan.ply", "scan.ply", "-o", "distances.ply", "--cylinder", "0.2"), "distances.ply"),
+            "ground": (("ground", "scan.ply", "-o", "ground.ply"), "ground.ply")} | {
+            ending: (("draw", "scan.ply", *section, "-o", f"sheet.{ending}"), f"sheet.{ending}") for ending in ("dxf", "svg", "png")}
+
+
 def left_beside(name):
     return [path.name for path in SCRATCH.iterdir() if path.name.startswith(name) and path.name != name]
 
@@ -74,7 +82,7 @@ def left_beside(name):
 def test_killed_at_any_moment():
     """Each kind of file of the command line."""
     chance, table = random.Random(49), []
-    for kind, (arguments, name) in commands().items():
+    for kind, (arguments, name) in (commands() | reports()).items():
         begun = time.monotonic()
         run(*arguments)
         took, wanted, path = time.monotonic() - begun, (SCRATCH / name).read_bytes(), SCRATCH / name
@@ -137,7 +145,7 @@ def limited(size):
 
 def test_full_disk():
     """Each kind of file of the command line: one message, status 1, the old file stays, nothing is left over."""
-    for kind, (arguments, name) in commands().items():
+    for kind, (arguments, name) in (commands() | reports()).items():
         run(*arguments)
         whole_size = (SCRATCH / name).stat().st_size
         (SCRATCH / name).write_bytes(b"before")
@@ -146,6 +154,21 @@ def test_full_disk():
             errors = [line for line in said.splitlines() if line and not re.search(r"100 %|points, |warning|note", line)]
             assert len(errors) == 1 and name in errors[0], f"{kind}, {size} bytes: {said}"
             assert (SCRATCH / name).read_bytes() == b"before" and not left_beside(name), f"{kind}, {size} bytes: {left_beside(name)}"
+
+
+def test_files_of_newer_versions():
+    """Of each kind with a version: refused with one line that names the file and says why."""
+    uses = {"cloud": ("info",), "shadows": ("render", "good.cloud", "-o", "new.png", *SMALL, *LIGHT, "--load-shadows"), "keys": ("merge", "-o", "new.png")}
+    for kind, use in uses.items():
+        arguments, name = commands()[kind]
+        run(*arguments)
+        data = bytearray((SCRATCH / name).read_bytes())
+        version = int.from_bytes(data[8:12], "little")
+        assert 0 < version < 1000, f"{kind}: no version behind the first eight bytes"
+        data[8:12] = (version + 1).to_bytes(4, "little")
+        (SCRATCH / f"newer.{kind}").write_bytes(data)
+        lines = run(*use, f"newer.{kind}", code=1).stderr.splitlines()
+        assert len(lines) == 1 and f"newer.{kind}" in lines[0] and "version" in lines[0], f"{kind}: {lines}"
 
 
 # ---- flipped bytes
@@ -197,29 +220,30 @@ def test_flipped_shadows_and_keys():
 
 def test_flipped_clouds():
     """By the command line: refused, or the picture is the same, or standard error names the file."""
-    commands()
-    run("render", "good.cloud", "-o", "good.png", *SMALL)
-    wanted, counts = (SCRATCH / "good.png").read_bytes(), {"refused": 0, "same": 0, "told": 0}
-    tried = 0
-    for place, data in flips(SCRATCH / "good.cloud", 4096):
-        if tried >= 40 and not LONG:
-            break
-        tried += 1
-        (SCRATCH / "flipped.cloud").write_bytes(data)
-        (SCRATCH / "flip.png").unlink(missing_ok=True)
-        done = subprocess.run([PATINA, "render", "flipped.cloud", "-o", "flip.png", *SMALL], capture_output=True, text=True, cwd=SCRATCH, timeout=120,
-                              check=False)
-        assert done.returncode in (0, 1), f"byte {place}: {done.returncode} {done.stderr}"
-        named = any("flipped.cloud" in line for line in done.stderr.splitlines())
-        if done.returncode:
-            assert named, f"byte {place}: {done.stderr}"
-            counts["refused"] += 1
-        elif (SCRATCH / "flip.png").read_bytes() == wanted:
-            counts["same"] += 1
-        else:
-            assert named, f"byte {place}: another picture, and nobody says so"
-            counts["told"] += 1
-    print(f"clouds: {tried} flips: {counts}")
+    for kind in ("cloud", "packed"):
+        arguments, name = commands()[kind]
+        run(*arguments)
+        run("render", name, "-o", "good.png", *SMALL)
+        wanted, counts, tried = (SCRATCH / "good.png").read_bytes(), {"refused": 0, "same": 0, "told": 0}, 0
+        for place, data in flips(SCRATCH / name, 4096):
+            if tried >= 24 and not LONG:
+                break
+            tried += 1
+            (SCRATCH / "flipped.cloud").write_bytes(data)
+            (SCRATCH / "flip.png").unlink(missing_ok=True)
+            done = subprocess.run([PATINA, "render", "flipped.cloud", "-o", "flip.png", *SMALL], capture_output=True, text=True, cwd=SCRATCH,
+                                  timeout=120, check=False)
+            assert done.returncode in (0, 1), f"{kind}, byte {place}: {done.returncode} {done.stderr}"
+            named = any("flipped.cloud" in line for line in done.stderr.splitlines())
+            if done.returncode:
+                assert named, f"{kind}, byte {place}: {done.stderr}"
+                counts["refused"] += 1
+            elif (SCRATCH / "flip.png").read_bytes() == wanted:
+                counts["same"] += 1
+            else:
+                assert named, f"{kind}, byte {place}: another picture, and nobody says so"
+                counts["told"] += 1
+        print(f"{kind}: {tried} flips: {counts}")
 
 
 # ---- files of the add-on
@@ -263,21 +287,22 @@ def test_whole_files_are_killed():
             whole.remove_left(folder, lambda item: item.name in {"data", "mine"})
             whole.remove_left_folders(folder, "patina-test-")
             assert [item.name for item in folder.glob("*.part")] == [Path(mine.name).name], sorted(folder.iterdir())
-            assert [item for item in folder.glob("patina-test-*")] == [held.parent] or \
-                all(not (item / "lock").exists() for item in folder.glob("patina-test-*") if item != held.parent), sorted(folder.glob("patina-test-*"))
+            assert list(folder.glob("patina-test-*")) == [held.parent], sorted(folder.glob("patina-test-*"))
         mine.write(b"whole")
     assert (folder / "mine").read_bytes() == b"whole" and not list(folder.glob("*.part")) and left > 0, left
 
 
 def test_whole_files_of_others_stay():
-    """Names that are not ours, and folders without a lock that are new, are left alone."""
+    """Names that are not ours, and folders with files but no lock that are new, are left alone."""
     folder = SCRATCH / "others"
     folder.mkdir()
     for name in ("film.mkv.part", "a.cloud.part2", "b.cloud.77-1.part", "b.cloud.77.part", "b.cloud.part.built"):
         (folder / name).write_bytes(b"x")
-    (folder / "patina-test-new").mkdir()
+    for name in ("new", "empty"):  # who made the second was killed before its lock
+        (folder / f"patina-test-{name}").mkdir()
+    (folder / "patina-test-new" / "file").write_bytes(b"x")
     assert whole.remove_left(folder, lambda item: item.name == "b.cloud") == 3
-    assert whole.remove_left_folders(folder, "patina-test-") == 0
+    assert whole.remove_left_folders(folder, "patina-test-") == 1 and (folder / "patina-test-new/file").exists()
     os.utime(folder / "patina-test-new", (1, 1))
     assert whole.remove_left_folders(folder, "patina-test-") == 1
     assert sorted(item.name for item in folder.iterdir()) == ["a.cloud.part2", "film.mkv.part"]
@@ -333,6 +358,45 @@ def test_exports_to_a_full_disk():
             assert path.read_bytes() == b"before", f"{ending}, {limit} bytes"
             left = [item.name for item in SCRATCH.glob(".patina-export-*")]
             assert not left, f"{ending}: {left}"
+
+
+EXPORTS = """
+import sys
+sys.path.insert(0, sys.argv[2])
+import test_caches as t
+from pathlib import Path
+points = t.points(40_000)
+print("begun", flush=True)
+while True:
+    t.exporters.write(Path(sys.argv[1]), points)
+"""
+
+
+def test_exports_are_killed():
+    """Of each format: the old file or the whole new one, and the next export removes what is left."""
+    from patina.read import readers
+    chance = random.Random(5)
+    for ending, needs in exporters.NEEDS.items():
+        if readers.lacks(*needs):
+            print(f"skip {ending}: {needs} not installed")
+            continue
+        path, left = SCRATCH / f"killed.{ending}", 0
+        exporters.write(path, points(40_000))
+        size = path.stat().st_size
+        for _ in range(KILLS if LONG else 2):
+            path.write_bytes(b"before")
+            process = subprocess.Popen([sys.executable, "-c", EXPORTS, path, str(Path(__file__).parent)], stdout=subprocess.PIPE,
+                                       env=os.environ | {"TMPDIR": str(SCRATCH)})
+            process.stdout.readline()
+            time.sleep(0.3 * chance.random())
+            process.kill()
+            process.communicate()
+            found = path.read_bytes()
+            assert found == b"before" or len(found) == size, f"{ending}: {len(found)} bytes, a whole file has {size}"
+            left += len(list(SCRATCH.glob(".patina-export-*")))
+            exporters.write(path, points(1000))
+            assert not list(SCRATCH.glob(".patina-export-*")), ending
+        print(f"{ending}: {left} killed exports left something for the next")
 
 
 def test_flipped_parts_of_streams():

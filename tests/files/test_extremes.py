@@ -22,6 +22,7 @@ import abi  # noqa: E402
 PATINA = str(Path(os.environ["PATINA_LIBRARY"]).parent / "patina")
 SCRATCH = Path(tempfile.mkdtemp(prefix="patina-extremes-"))
 GIGA = 1 << 30
+CLOSE = ("--look", "0.5,0.5,12,0.5,0.501,0,40")  # points of some() fill a ninth of the width: the gaps between them are few pixels wide
 FLAT = ("--analysis", "off", "--smooth", "off")
 
 
@@ -68,9 +69,10 @@ def some():
 
 
 def test_too_large_for_the_memory():
-    """16384 x 16384 with 2 GB, and more pixels than a plane has."""
-    refused(patina("render", some(), "-o", "x.png", "--size", "16384x16384", *FLAT, memory=2 * GIGA), "out of memory")
-    refused(patina("render", some(), "-o", "x.png", "--size", "65536x65536", *FLAT), "too large")
+    """16384 x 16384 with 2 GB, of points so far apart that strips do not help, and more pixels than a plane has: statistics
+    are of whole images, which are not drawn in strips."""
+    refused(patina("render", some(), "-o", "x.png", "--size", "16384x16384", *FLAT, memory=2 * GIGA), "render it in regions")
+    refused(patina("render", some(), "-o", "x.png", "--size", "65536x65536", "--stats", "json", *FLAT), "too large")
     assert not (SCRATCH / "x.png").exists()
 
 
@@ -78,6 +80,19 @@ def test_little_memory():
     """2 GB are enough for 4096 x 4096, or one message says that they are not."""
     code, _, said, _, _ = patina("render", some(), "-o", "four.png", "--size", "4096x4096", "--device", "cpu", "--threads", "1", *FLAT, memory=2 * GIGA)
     assert code == 0 and size_of("four.png") == (4096, 4096, True) or code == 1 and len(said.splitlines()) == 1 and "memory" in said, said
+
+
+def test_strips_where_memory_lacks():
+    """An image that is larger than the memory is drawn in strips, which give the same file."""
+    close = ("--size", "2048x2048", "--device", "cpu", "--threads", "1", *CLOSE, *FLAT)
+    files, peaks = [], []
+    for name, memory in (("whole.png", 0), ("strips.png", 6 * GIGA // 10)):
+        code, _, said, _, peak = patina("render", some(), "-o", name, *close, memory=memory)
+        assert code == 0, said
+        files.append((SCRATCH / name).read_bytes())
+        peaks.append(peak)
+    assert files[0] == files[1]
+    assert peaks[1] < 0.8 * peaks[0], peaks
 
 
 def test_narrow():
@@ -129,16 +144,57 @@ def test_a_billion_points_at_one_place():
     assert resource.getrusage(resource.RUSAGE_SELF).ru_utime - before < 2
 
 
-def test_small_blocks():
-    """4096 x 4096 on OpenGL: where shaders reach no more than 128 MiB of a plane, as in Mesa's software, one message says so. Else there is an image."""
+def test_large_light_maps():
+    """Points so close together that the light's map is as fine as is allowed: where a driver's blocks are smaller than that, one message says so
+    before anything is drawn."""
+    name = cloud("dense.ply", [(i * 1e-4 + at, k * 1e-4 + at, 0.2 * at) for at in (0, 1) for i in range(110) for k in range(110)])
+    view = (name, "-o", "map.png", "--size", "64x64", "--shadows", *FLAT)
+    code, _, said, _, _ = patina("render", *view, "--device", "cpu")
+    assert code == 0, said
+    (SCRATCH / "map.png").unlink()
     code, _, said, _, _ = patina("render", some(), "-o", "small.png", "--size", "64x64", "--device", "gl-egl", *FLAT)
     if code:
         raise Skip(f"there is no OpenGL device here: {said.strip()}")
-    result = patina("render", some(), "-o", "blocks.png", "--size", "4096x4096", "--device", "gl-egl", *FLAT)
+    result = patina("render", *view, "--device", "gl-egl")
+    if result[0]:
+        refused(result, "lower the shadow resolution")
+    assert (SCRATCH / "map.png").exists() == (result[0] == 0)
+
+
+def test_large_panoramas():
+    """Faces that do not fit into memory, one of them or all six, are refused before the first is drawn, with a way that helps."""
+    for size, memory, words in (("65536x32768", 16 * GIGA, "make the panorama smaller"), ("16384x8192", 4 * GIGA, "six faces of")):
+        refused(patina("render", some(), "-o", "around.png", "--panorama", size, "--device", "cpu", "--threads", "1", *FLAT, memory=memory), words)
+    assert not (SCRATCH / "around.png").exists()
+
+
+def test_soft_points_in_one_pixel():
+    """More balls behind one another than a driver's block has room for: one message, before they are drawn."""
+    path = SCRATCH / "balls.ply"
+    path.write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex 3000000\nproperty float x\nproperty float y\nproperty float z\n"
+                     b"end_header\n" + bytes(12 * 3_000_000))
+    view = (path, "-o", "balls.png", "--size", "33x33", "--look", "0,0.001,9,0,0,0,20", *FLAT, "--soft", "base", "--soft-radius", "0.01")
+    code, _, said, seconds, _ = patina("render", *view, "--device", "gl-egl")
+    assert code == 0 or len(said.splitlines()) == 1, said
+    if code and "driver" not in said:
+        raise Skip(f"there is no OpenGL device here: {said.strip()}")
+    if code:
+        assert "MB are the most that its driver allows" in said and not (SCRATCH / "balls.png").exists(), said
+
+
+def test_small_blocks():
+    """4096 x 4096 on OpenGL, where shaders may reach no more than 128 MiB of a plane, as in Mesa's software: strips give an image. Where points
+    are so far apart that no strip does, one message says so."""
+    code, _, said, _, _ = patina("render", some(), "-o", "small.png", "--size", "64x64", "--device", "gl-egl", *FLAT)
+    if code:
+        raise Skip(f"there is no OpenGL device here: {said.strip()}")
+    code, _, said, _, _ = patina("render", some(), "-o", "blocks.png", "--size", "4096x4096", "--device", "gl-egl", *CLOSE, *FLAT)
+    assert code == 0 and size_of("blocks.png") == (4096, 4096, True), said
+    result = patina("render", some(), "-o", "sparse.png", "--size", "4096x4096", "--device", "gl-egl", *FLAT)
     if result[0] == 0:
-        assert size_of("blocks.png") == (4096, 4096, True)
+        assert size_of("sparse.png") == (4096, 4096, True)
     else:
-        refused(result, "shaders reach", memory=4 * GIGA)  # it has made room for the planes by then
+        refused(result, "render it in regions")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import sys
 import tempfile
 import threading
 import time
+import tracemalloc
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from unittest import mock
@@ -358,6 +359,30 @@ def test_chains_of_pages():
         assert 0 < len(asked) <= most, len(asked)
         left = [file for file in keep.rglob("*.kept")]
         assert not left, left[:3]
+
+
+def test_files_in_folders_of_ept():
+    """A file takes as much memory as it has bytes, whatever it may have at the most; a named pipe is no file."""
+    folder, _ = ept_folder("memory")
+    own = source.FolderSource(str(folder / "ept.json"))
+    tracemalloc.start()
+    try:
+        assert own.file("ept.json") == (folder / "ept.json").read_bytes()
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 1 << 20, f"{peak:,} bytes for a small file"
+    cases = [("ept.json", 5, "is larger than 5 bytes")]
+    if os.name != "nt":
+        os.mkfifo(folder / "pipe.bin")
+        cases.append(("pipe.bin", 5, "is no file"))
+    for name, most, words in cases:
+        try:
+            own.file(name, most)
+        except source.SourceError as error:
+            assert words in str(error), error
+        else:
+            raise AssertionError(f"{name} was read")
 
 
 def test_limits_of_silence():

@@ -5,8 +5,8 @@
 // looks behind it sees the edits. The last byte of an odd list cuts the file. What opens is verified, and drawn in one of three ways.
 #include "fuzz.h"
 
-#include "scene/cloud.h"
-#include "scene/fingerprint.h"
+#include "scene/clouds/cloud.h"
+#include "scene/clouds/fingerprint.h"
 
 enum {
     SECTION = 1 << 16,

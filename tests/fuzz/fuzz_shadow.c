@@ -4,7 +4,7 @@
 // reached. What loads is drawn.
 #include "fuzz.h"
 
-#include "scene/fingerprint.h"
+#include "scene/clouds/fingerprint.h"
 
 #include <fcntl.h>
 #include <stdbool.h>

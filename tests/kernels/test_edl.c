@@ -65,6 +65,18 @@ static void kinds(struct harness *h)
             }
 }
 
+// Faces of panoramas: depths are distances from the eye.
+static void faces(struct harness *h)
+{
+    for (int kind = 0; kind < PICTURE_KINDS; kind++)
+        for (int r = 0; r < 2; r++) {
+            struct picture picture = effect_picture(h, (uint64_t)(kind + 80), 67, 45, 1, (enum picture_kind)kind, r == 1);
+            struct edl_args args = args_of(&picture.view, r ? 16 : 1, 300.0f, 0.1f);
+            args.from_eye = 1;
+            effect_check(h, &edl, &args, sizeof args, &picture, NULL);
+        }
+}
+
 static void shapes(struct harness *h)
 {
     static const uint32_t sizes[][2] = {{1, 1}, {16384, 1}, {1, 70}, {64, 64}};
@@ -141,8 +153,13 @@ static void sanity(struct harness *h)
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0},    {"shapes of planes", shapes, 0},
-        {"scales", scales, 0}, {"dense and sparse points", widths, 0}, {"rectangle", rectangle, 0},
+        {"sanity", sanity, 1},
+        {"pictures of all kinds", kinds, 0},
+        {"shapes of planes", shapes, 0},
+        {"scales", scales, 0},
+        {"dense and sparse points", widths, 0},
+        {"rectangle", rectangle, 0},
+        {"faces of panoramas", faces, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

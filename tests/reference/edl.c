@@ -7,11 +7,20 @@
 
 #include <math.h>
 
-// log2 z with the error that float32 may have; z itself where the view is orthographic.
-static double depth_of(const struct view_args *view, double z, double *error)
+// log2 of z, or of the distance from the eye, with the error that float32 may have; z itself where the view is orthographic.
+static double depth_of(const struct edl_args *args, double z, int x, int y, double *error)
 {
-    *error = view->perspective ? TOL_LOG + TOL_UNIT * fabs(log2(z)) : 0.0;
-    return view->perspective ? log2(z) : z;
+    *error = 0.0;
+    if (!args->view.perspective)
+        return z;
+    *error = TOL_LOG + TOL_UNIT * fabs(log2(z));
+    if (!args->from_eye)
+        return log2(z);
+    const struct ref_ray ray = ref_ray(&args->view, x, y);
+    const double square = ray.u * ray.u + ray.v * ray.v + 1.0, depth = log2(z) + 0.5 * log2(square);
+    // of the square's roundings each is a share of it, log2 takes 1.4427 of that; u and v round on their way, too
+    *error += 0.5 * (TOL_LOG + TOL_UNIT * log2(square)) + 0.5 * 1.4427 * 12.0 * TOL_UNIT + 2.0 * TOL_UNIT * fabs(depth);
+    return depth;
 }
 
 // Two spacings of what the pixel shows, in pixels, and how far float32 may be off.
@@ -48,7 +57,7 @@ struct ref_color ref_edl(const struct edl_args *args, const struct ref_planes *p
     const struct view_args *view = &args->view;
     size_t pixel = (size_t)y * view->width + (size_t)x;
     struct ref_color out = {0};
-    double own_error, own = depth_of(view, ref_key_z(planes->keys[pixel]), &own_error), sum = 0.0, error = 0.0;
+    double own_error, own = depth_of(args, ref_key_z(planes->keys[pixel]), x, y, &own_error), sum = 0.0, error = 0.0;
     double width_error, width = least_width(args, planes, x, y, ref_key_z(planes->keys[pixel]), &width_error);
     int radius = 0;
     while (radius < PT_EDL_RADII - 1 && width > args->wide[radius])
@@ -65,7 +74,7 @@ struct ref_color ref_edl(const struct edl_args *args, const struct ref_planes *p
             sum += (double)PT_EDL_STEP;
             continue;
         }
-        double near_error, near = depth_of(view, ref_key_z(key), &near_error), behind = args->scale * (own - near);
+        double near_error, near = depth_of(args, ref_key_z(key), qx, qy, &near_error), behind = args->scale * (own - near);
         double most = args->scale * (own_error + near_error) + 2.0 * TOL_UNIT * fabs(behind);
         if (behind - most < (double)PT_EDL_STEP && behind + most > 0.0)
             error += most;

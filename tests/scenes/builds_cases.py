@@ -200,11 +200,10 @@ def _effects(to: _List) -> None:
     }
     for name, effect in effects.items():
         to.add(f"effect {name}", effects=effect)
-    for effect in table.read():
+    for effect in table.own():
         begins = {field["name"]: list(field["start"]) if field["kind"] == "COLOR" else field["start"] for field in effect["fields"] if "start" in field}
-        if effect["panel"] != "CAMERA":
-            to.add(f"effect {effect['name']} as it begins", effects=begins)
-            to.add(f"effect {effect['name']}, layers, orthographic", GLASS_TORUS, FLOOR, effects=begins, camera={"kind": "parallel"})
+        to.add(f"effect {effect['name']} as it begins", effects=begins)
+        to.add(f"effect {effect['name']}, layers, orthographic", GLASS_TORUS, FLOOR, effects=begins, camera={"kind": "parallel"})
     together = {"edl_strength": 1.0, "obscurance_strength": 1.0, "toon_bands": 4, "hatch_levels": 2, "fog_density": 0.6, "fog_start": 3.0,
                 "fog_end": 5.0, "focus_aperture": 0.05, "focus_distance": 3.4, "paper_grain": 0.3}
     to.add("effects together", effects=together)

@@ -2,7 +2,7 @@
 #include "levels.h"
 
 #include "base/platform.h"
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 #include "support.h"
 
 #include <math.h>

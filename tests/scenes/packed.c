@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "packed.h"
 
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 #include "support.h"
 
 #include <stdlib.h>

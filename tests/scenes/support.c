@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
+#include <unistd.h>
 
 #if defined(__aarch64__)
 static const char *const all_devices[] = {"cpu", "cpu-scalar", "cpu-neon", "gl-egl", "gl-osmesa"};
@@ -82,6 +84,35 @@ int support_is_quick(const char *left_out)
 uint32_t support_device_count(void) { return chosen_count; }
 const char *support_device_name(uint32_t i) { return chosen[i]; }
 int support_is_gl(const char *name) { return !strncmp(name, "gl", 2); }
+
+double support_processor_seconds(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+double support_cancel(support_start *start, void *context)
+{
+    int code = PATINA_OK;
+    double late = 0.0;
+    for (int again = 0; again < 20 && code == PATINA_OK; again++) { // a busy machine may wake this thread too late
+        patina_progress *progress = NULL;
+        patina_task *task = NULL;
+        CHECK(patina_progress_create(&progress), NULL);
+        CHECK(start(context, progress, &task), NULL);
+        while (!patina_task_done(task) && !(patina_progress_value(progress) > 0.02f))
+            usleep(500);
+        const double begin = support_processor_seconds();
+        patina_progress_cancel(progress);
+        code = patina_task_wait(task);
+        late = support_processor_seconds() - begin;
+        patina_task_destroy(task);
+        patina_progress_destroy(progress);
+    }
+    assert_int_equal(code, PATINA_ERROR_CANCELLED);
+    return late;
+}
 
 patina_device *support_device_open(const char *name, uint32_t threads, uint32_t batch)
 {

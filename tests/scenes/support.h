@@ -27,6 +27,16 @@ _Noreturn void support_die(const char *format, ...) SUPPORT_PRINTF;
 void support_check(int code, const void *handle, const char *file, int line);
 const char *support_message(const void *handle); // static buffer
 
+// ---- work ----------------------------------------------------------------------------------------------------------
+
+// Of all threads of this program, which other programs do not lengthen.
+double support_processor_seconds(void);
+// Starts a task of the library, whose progress it gets. Returns the task's code.
+typedef int support_start(void *context, patina_progress *progress, patina_task **task);
+// Cancels tasks after their first steps until one notices before its end. Returns the processor's seconds from that cancel to the task's
+// end. The test fails if no task notices.
+double support_cancel(support_start *start, void *context);
+
 // ---- devices: `--device NAME` (may be repeated) or `--device all`, the default -------------------------------------
 
 void support_set_variable(const char *name, const char *value); // of the environment; NULL: there is none

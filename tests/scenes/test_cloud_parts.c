@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A cloud that is made of parts (scene/parts.h) is one cloud to whoever draws it, picks of it or reads its shadows: the bytes are those of the
+// A cloud that is made of parts (scene/clouds/parts.h) is one cloud to whoever draws it, picks of it or reads its shadows: the bytes are those of the
 // same cloud in one piece.
 #include "clouds.h"
-#include "scene/parts.h"
+#include "scene/clouds/parts.h"
 #include "support.h"
 
 #include <math.h>

@@ -3,7 +3,7 @@
 // (SPEC 13).
 #include "clouds.h"
 #include "plan/plan.h"
-#include "scene/clusters.h"
+#include "scene/clouds/clusters.h"
 #include "support.h"
 #include "town.h"
 

@@ -2,6 +2,7 @@
 // Effects on whole pictures: regions and tiles equal crops, threads and batches change nothing, devices agree within the
 // table; depth, normals, source and keys stay as they are without effects; off is as it was. Effects that no row shows are shown as
 // the table of effects begins them.
+#include "scene/scene.h"
 #include "staging.h"
 #include "tolerances.h"
 
@@ -29,6 +30,13 @@ static const struct show rows[] = {
     {"depth of field", {.focus_aperture = 1.2f, .focus_distance = 2.2f}, 1e-3f}, // circles' rims are a pixel wide
     {"depth of field, wide", {.focus_aperture = 3.0f, .focus_distance = 2.4f}, 1e-3f},
     {"paper", {.paper_color = {0.9f, 0.8f, 0.6f}, .paper_grain = 0.5f}, 0.0f},
+    {"contour lines",
+     {.contour_width = 1.0f,
+      .contour_every = 5,
+      .contour_bold = 2.0f,
+      .contour_color = {0.09f, 0.03f, 0.01f},
+      .contour_opacity = 1.0f},
+     0.05f}, // lines' edges are a pixel wide
     {"all",
      {.edl_strength = 0.5f,
       .obscurance_strength = 1.0f,
@@ -48,11 +56,6 @@ enum { ROWS = sizeof rows / sizeof rows[0], MOST = 64, FOG = 6, ALL = ROWS - 1 }
 
 static struct show shows[MOST];
 static uint32_t show_count;
-
-// Of effects in the table; of what is drawn the edges are a pixel wide, of a lens circles' rims.
-#define NOISE_CUES 0.0f
-#define NOISE_DRAWING 0.05f
-#define NOISE_CAMERA 1e-3f
 
 // A field as Blender begins it: of (start, low, usual, high) the first.
 #define FIRST(start, ...) start
@@ -86,7 +89,7 @@ static void add_shows(void)
 #define PATINA_EFFECT(id, label, panel, ...)                                                                                   \
     if (!shown)                                                                                                                \
         add_show(&own);                                                                                                        \
-    own = (struct show){.name = label, .noise = NOISE_##panel};                                                                \
+    own = (struct show){.name = label};                                                                                        \
     shown = 0;
 #define PATINA_EFFECT_NUMBER(field, when, least, most, zero, unit, begun, ...)                                                 \
     own.effects.field = (float)(FIRST begun);                                                                                  \
@@ -406,6 +409,164 @@ static void test_sparse_points_have_no_outlines(void **state)
     patina_device_destroy(device);
 }
 
+// ---- panoramas -----------------------------------------------------------------------------------------------------------
+
+enum { AROUND = 384, BLOCK = 12 };
+
+// Points at random on the inside of a room of 8 x 8 x 3, and on five pillars in it.
+static patina_cloud *room(void)
+{
+    enum { WALLS = 90000, PILLARS = 15000, ALL_POINTS = WALLS + PILLARS };
+    static const double feet[5][2] = {{2, 1}, {-2, 1.5}, {1, -2.2}, {-1.5, -2}, {2.5, -0.5}};
+    float *position = calloc(3 * ALL_POINTS, sizeof *position), *normal = calloc(3 * ALL_POINTS, sizeof *normal);
+    struct pcg random = pcg_seed(9);
+    for (int i = 0; i < WALLS; i++) {
+        const int axis = i % 3, side = i / 3 % 2 ? 1 : -1;
+        for (int k = 0; k < 3; k++)
+            position[3 * i + k] = (float)((k == 2 ? 1.5 : 4.0) * (k == axis ? side : pcg_between(&random, -1.0, 1.0)));
+        normal[3 * i + axis] = (float)-side;
+    }
+    for (int i = WALLS; i < ALL_POINTS; i++) {
+        const double angle = pcg_between(&random, 0.0, 6.28318530718), *foot = feet[i % 5];
+        const double at[3] = {foot[0] + 0.2 * cos(angle), foot[1] + 0.2 * sin(angle), pcg_between(&random, -1.5, 1.5)};
+        for (int k = 0; k < 3; k++)
+            position[3 * i + k] = (float)at[k];
+        normal[3 * i] = (float)cos(angle);
+        normal[3 * i + 1] = (float)sin(angle);
+    }
+    const patina_cloud_desc desc = {.struct_size = sizeof desc,
+                                    .count = ALL_POINTS,
+                                    .position = {position, PATINA_FLOAT32, 3, 0},
+                                    .normal = {normal, PATINA_FLOAT32, 3, 0}};
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
+    CHECK(patina_cloud_analyse(cloud, NULL, NULL), cloud);
+    free(position);
+    free(normal);
+    return cloud;
+}
+
+// Red of the panorama whose middle looks along `turn`, radians; from the bottom row on.
+static float *look_around(patina_device *device, const patina_cloud *cloud, const patina_effects *effects, double turn)
+{
+    const double c = cos(turn), s = sin(turn);
+    const patina_panorama panorama = {.struct_size = sizeof panorama,
+                                      .width = AROUND,
+                                      .height = AROUND / 2,
+                                      .world_from_camera = {c, 0, s, 0, s, 0, -c, 0, 0, 1, 0, 0, 0, 0, 0, 1},
+                                      .near_clip = 0.01,
+                                      .far_clip = 100};
+    const patina_light_desc suns[2] = {{.struct_size = sizeof suns[0],
+                                        .type = PATINA_LIGHT_SUN,
+                                        .power = 2,
+                                        .color = {1, 1, 1},
+                                        .direction = {0.3, 0.5, -0.8}},
+                                       {.struct_size = sizeof suns[0],
+                                        .type = PATINA_LIGHT_SUN,
+                                        .power = 2,
+                                        .color = {1, 1, 1},
+                                        .direction = {-0.6, -0.3, 0.5}}};
+    patina_scene *scene = NULL;
+    patina_frame *frame = NULL;
+    float *faces[6], *joined = malloc((size_t)AROUND * AROUND / 2 * 4 * sizeof *joined);
+    CHECK(patina_scene_create(&scene), NULL);
+    CHECK(patina_scene_add_cloud(scene, cloud, NULL), scene);
+    for (int i = 0; i < 2; i++)
+        CHECK(patina_scene_add_light(scene, &suns[i]), scene);
+    CHECK(patina_scene_set_effects(scene, effects), scene);
+    CHECK(patina_frame_create(device, &frame), device);
+    for (uint32_t face = 0; face < 6; face++) {
+        patina_camera camera = {.struct_size = sizeof camera};
+        uint32_t side = 0;
+        CHECK(patina_panorama_camera(&panorama, face, &camera, &side), NULL);
+        assert_int_equal(camera.panorama_face, 1);
+        const patina_settings settings = {.struct_size = sizeof settings, .width = side, .height = side, .film_transparent = 1};
+        CHECK(patina_scene_set_settings(scene, &settings), scene);
+        CHECK(patina_scene_set_camera(scene, &camera), scene);
+        CHECK(patina_frame_render(frame, scene), frame);
+        faces[face] = malloc((size_t)side * side * 16);
+        CHECK(patina_frame_read(frame, PATINA_PASS_COMBINED, faces[face], (size_t)side * side * 16), frame);
+    }
+    const float *const read[6] = {faces[0], faces[1], faces[2], faces[3], faces[4], faces[5]};
+    CHECK(patina_panorama_join(&panorama, PATINA_PASS_COMBINED, read, joined, (size_t)AROUND * AROUND / 2 * 16), NULL);
+    for (int face = 0; face < 6; face++)
+        free(faces[face]);
+    patina_frame_destroy(frame);
+    patina_scene_destroy(scene);
+    return joined;
+}
+
+// Mean red of a block of pixels, whose columns go around.
+static double tone(const float *joined, int x, int y, int shift)
+{
+    double sum = 0.0;
+    for (int i = 0; i < BLOCK * BLOCK; i++)
+        sum += (double)joined[4 * ((size_t)(y + i / BLOCK) * AROUND + (size_t)(x + i % BLOCK + shift) % AROUND)];
+    return sum / (BLOCK * BLOCK);
+}
+
+// A panorama that begins an eighth of a turn further has its cube's edges where the other has the middles of faces: tones are the same, as
+// no edge shows. Strokes and grain may fall elsewhere, so blocks of pixels are compared, off the poles.
+static void test_panoramas_show_no_edges(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_open("cpu", 0, 0);
+    patina_cloud *cloud = room();
+    for (uint32_t show = 0; show < show_count; show++) {
+        patina_effects effects = shows[show].effects;
+        effects.struct_size = sizeof effects;
+        float *ahead = look_around(device, cloud, &effects, 0.0),
+              *turned = look_around(device, cloud, &effects, 0.78539816339744831);
+        double worst_tone = 0.0, sum = 0.0;
+        int blocks = 0;
+        for (int y = AROUND / 8; y < AROUND / 2 - AROUND / 8; y += BLOCK)
+            for (int x = 0; x < AROUND; x += BLOCK, blocks++) {
+                const double off = fabs(tone(ahead, x, y, 0) - tone(turned, x, y, AROUND / 8));
+                worst_tone = fmax(worst_tone, off);
+                sum += off;
+            }
+        if (!(sum / blocks < 0.02) || !(worst_tone < 0.1)) // of depths along the view: 0.098 and 0.31
+            fail_msg("%s: blocks differ by %.4f on average, %.4f at most", shows[show].name, sum / blocks, worst_tone);
+        free(ahead);
+        free(turned);
+    }
+    patina_cloud_destroy(cloud);
+    patina_device_destroy(device);
+}
+
+// ---- samples -------------------------------------------------------------------------------------------------------------
+
+// Effects that are measured in pixels of the image limit how many finer pixels one of them may have; others do not.
+static void test_finer_pixels(void **state)
+{
+    (void)state;
+    static const struct {
+        patina_effects effects;
+        uint32_t most;
+    } cases[] = {
+        {{0}, 40},
+        {{.edl_strength = 1.0f}, 11}, // 16 / 1.4
+        {{.edl_strength = 1.0f, .edl_radius = 16.0f}, 1},
+        {{.edl_radius = 16.0f, .obscurance_radius = 1.0f, .focus_distance = 1.0f}, 40}, // all are off
+        {{.obscurance_strength = 1.0f}, 1},
+        {{.focus_aperture = 0.1f, .focus_distance = 1.0f}, 1},
+        {{.paper_grain = 0.1f}, 1},
+        {{.paper_color = {0.9f, 0.8f, 0.6f}}, 40},
+        {{.toon_bands = 3, .hatch_levels = 3, .contour_opacity = 1.0f, .fog_density = 1.0f, .fog_end = 1.0f}, 40},
+    };
+    patina_scene *scene = NULL;
+    CHECK(patina_scene_create(&scene), NULL);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        patina_effects effects = cases[i].effects;
+        effects.struct_size = sizeof effects;
+        CHECK(patina_scene_set_effects(scene, &effects), scene);
+        assert_int_equal(pt_effects_grid(&scene->effects, 40), cases[i].most);
+    }
+    patina_scene_destroy(scene);
+}
+
+// ---- refusals ------------------------------------------------------------------------------------------------------------
+
 static void refuse(patina_scene *scene, const char *what, const patina_effects *wrong)
 {
     patina_effects effects = *wrong;
@@ -498,10 +659,16 @@ int main(int argc, char **argv)
     support_arguments(argc, argv);
     add_shows();
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_regions),          cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_devices),          cmocka_unit_test(test_nothing_else_changes),
-        cmocka_unit_test(test_refusals),         cmocka_unit_test(test_one_by_one),
-        cmocka_unit_test(test_passes_asked_for), cmocka_unit_test(test_sparse_points_have_no_outlines),
+        cmocka_unit_test(test_regions),
+        cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_devices),
+        cmocka_unit_test(test_nothing_else_changes),
+        cmocka_unit_test(test_finer_pixels),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_one_by_one),
+        cmocka_unit_test(test_passes_asked_for),
+        cmocka_unit_test(test_sparse_points_have_no_outlines),
+        cmocka_unit_test(test_panoramas_show_no_edges),
 #ifndef _WIN32
         cmocka_unit_test(test_shader_errors),
 #endif

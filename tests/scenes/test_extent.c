@@ -3,7 +3,7 @@
 // Soft balls are checked against 1 - product(1 - opacity) through their centers.
 #include "soft.h"
 
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -200,6 +200,87 @@ static void test_extent(void **state)
     patina_cloud_destroy(plain);
 }
 
+// Points of a page that is on its way will be as wide as the style says.
+static void test_extent_of_pages(void **state)
+{
+    (void)state;
+    const patina_page page = {
+        .box_min = {-0.5, -0.5, -0.5}, .box_max = {0.5, 0.5, 0.5}, .gap = 0.2, .count = 16, .parent = PATINA_NO_PAGE};
+    const patina_pages_desc desc = {.struct_size = sizeof desc, .pages = &page, .page_count = 1};
+    patina_cloud_style soft = soft_style(PATINA_SOFT_BASE), solid = PATINA_CLOUD_STYLE_INIT;
+    patina_settings settings = settings_of();
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_pages_begin(&desc, &cloud), NULL);
+    soft.soft_radius = 2.0f;
+    solid.radius = 1.0f;
+    patina_scene *scene = scene_of(cloud, &soft);
+    expect_extent(scene, 2.5, "balls of a page");
+    CHECK(patina_scene_clear(scene), scene);
+    CHECK(patina_scene_add_cloud(scene, cloud, &solid), scene);
+    expect_extent(scene, 0.5, "points of a page");
+    settings.surface = PATINA_SURFACE_SPLATS;
+    CHECK(patina_scene_set_settings(scene, &settings), scene);
+    expect_extent(scene, 1.5, "discs of a page");
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+// ---- frames ------------------------------------------------------------------------------------------------------------
+
+// Whole balls of so much around the layout's places lie within the picture and its depths, and nearly fill it.
+static void expect_in_frame(const patina_scene *scene, const struct layout *layout, double radius, const char *what)
+{
+    enum { AROUND = 64, ALONG = 32 };
+    const double pi = 3.14159265358979323846;
+    patina_camera camera = {.struct_size = sizeof camera};
+    CHECK(patina_scene_frame_camera(scene, 30.0, 40.0, 0.0, &camera), scene);
+    double most = 0.0;
+    for (uint32_t i = 0; i < layout->count * AROUND * ALONG; i++) {
+        const double *center = layout->place[i / (AROUND * ALONG)], turn = 2.0 * pi * (i % AROUND) / AROUND,
+                     rise = pi * ((i / AROUND % ALONG) / (ALONG - 1.0) - 0.5);
+        const double place[3] = {center[0] + radius * cos(rise) * cos(turn), center[1] + radius * cos(rise) * sin(turn),
+                                 center[2] + radius * sin(rise)};
+        double x, y, z;
+        camera_project(&camera, SIZE, SIZE, place, &x, &y, &z);
+        if (!(z > camera.near_clip && z < camera.far_clip))
+            support_die("%s: %g lies beyond the depths %g to %g", what, z, camera.near_clip, camera.far_clip);
+        most = fmax(most, fmax(fabs(2.0 * x / SIZE - 1.0), fabs(2.0 * y / SIZE - 1.0)));
+    }
+    printf("  %s: up to %.3f of the picture\n", what, most);
+    if (!(most > 0.85 && most <= 1.0))
+        support_die("%s: up to %.3f of the picture", what, most);
+}
+
+static void test_frames(void **state)
+{
+    (void)state;
+    for (int which = 0; which < 3; which++) {
+        const struct layout layout = layout_at(which);
+        patina_cloud *own = upload(&layout, 1), *bare = upload(&layout, 0);
+        patina_cloud_style soft = soft_style(PATINA_SOFT_BASE), solid = PATINA_CLOUD_STYLE_INIT;
+        patina_settings settings = settings_of();
+        char what[64];
+        snprintf(what, sizeof what, "%s with radii", layout.name);
+        patina_scene *scene = scene_of(own, &soft);
+        CHECK(patina_scene_set_settings(scene, &settings), scene);
+        expect_in_frame(scene, &layout, layout.radius, what);
+        CHECK(patina_scene_clear(scene), scene);
+        soft.soft_radius = solid.radius = 0.4f;
+        CHECK(patina_scene_add_cloud(scene, bare, &soft), scene);
+        snprintf(what, sizeof what, "%s with the style's radius", layout.name);
+        expect_in_frame(scene, &layout, 0.4, what);
+        CHECK(patina_scene_clear(scene), scene);
+        settings.surface = PATINA_SURFACE_SPLATS;
+        CHECK(patina_scene_set_settings(scene, &settings), scene);
+        CHECK(patina_scene_add_cloud(scene, bare, &solid), scene);
+        snprintf(what, sizeof what, "%s as discs", layout.name);
+        expect_in_frame(scene, &layout, 0.4, what);
+        patina_scene_destroy(scene);
+        patina_cloud_destroy(own);
+        patina_cloud_destroy(bare);
+    }
+}
+
 // ---- borders -----------------------------------------------------------------------------------------------------------
 
 // A ball whose center lies beyond the picture's border, before the near plane or behind the eye shows the part that is within; regions
@@ -284,10 +365,8 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_opacity),
-        cmocka_unit_test(test_extent),
-        cmocka_unit_test(test_borders),
-        cmocka_unit_test(test_pages),
+        cmocka_unit_test(test_opacity), cmocka_unit_test(test_extent),  cmocka_unit_test(test_extent_of_pages),
+        cmocka_unit_test(test_frames),  cmocka_unit_test(test_borders), cmocka_unit_test(test_pages),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

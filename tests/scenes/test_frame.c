@@ -535,7 +535,7 @@ static void test_memory_cap(void **state)
         patina_frame *frame = frame_of(device, &stage);
         int code = patina_frame_render(frame, stage.scene);
         if (capped == 2) {
-            assert_int_equal(code, PATINA_ERROR_MEMORY);
+            assert_int_equal(code, PATINA_ERROR_TOO_LARGE);
             printf("  message: %s\n", support_message(frame));
         } else {
             CHECK(code, frame);

@@ -6,7 +6,7 @@
 
 #include "folder.h" // behind cmocka.h
 
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -17,8 +17,8 @@ int main(void)
 #include "folder.h" // behind cmocka.h
 
 #include "base/platform.h"
-#include "scene/cloud.h"
-#include "scene/page_sums.h"
+#include "scene/clouds/cloud.h"
+#include "scene/clouds/page_sums.h"
 
 #include <math.h>
 #include <signal.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the viewport needs: quick pictures of a few strata that still close, and colours that change alone.
 #include "clouds.h"
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 #include "support.h"
 
 #include <stdio.h>

@@ -9,9 +9,9 @@
 #include "base/platform.h"
 #include "run/page_check.h"
 #include "run/pager.h"
-#include "scene/cloud.h"
-#include "scene/fingerprint.h"
-#include "scene/page_sums.h"
+#include "scene/clouds/cloud.h"
+#include "scene/clouds/fingerprint.h"
+#include "scene/clouds/page_sums.h"
 
 #include <math.h>
 #include <stdio.h>

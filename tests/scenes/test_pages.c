@@ -2,7 +2,7 @@
 // Clouds whose points arrive page by page (SPEC 14): whatever the order, the same picture in the end, as of the saved file; before, what
 // has arrived; lists of what is wanted; pages that are not what was promised.
 #include "clouds.h"
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 #include "support.h"
 
 #include <math.h>

@@ -309,7 +309,7 @@ static void test_refusals(void **state)
     style = soft_style(3);
     refuse(scene, cloud, &style, "soft_model");
     style = soft_style(0);
-    style.soft = 3;
+    style.soft = 4;
     refuse(scene, cloud, &style, "soft");
     style = soft_style(0);
     style.soft_shells = 65;

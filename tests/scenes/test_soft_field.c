@@ -158,6 +158,46 @@ static void test_divide(void **state)
     support_each_device(divide);
 }
 
+// Hidden by its field is the same as hidden by a mask, with shadows, and when points are picked. Byte for byte.
+static void hide(patina_device *device, const char *name)
+{
+    static const float thresholds[] = {0.5f, 0.1f, 1.0f};
+    for (size_t k = 0; k < sizeof thresholds / sizeof thresholds[0]; k++) {
+        struct room room = room_make(thresholds[k]);
+        patina_cloud_style style = field_style(&room, PATINA_SOFT_EXPRESS), solid = style_of(PATINA_SOFT_OFF, 0);
+        style.soft = PATINA_SOFT_HIDDEN;
+        solid.mask = room.solid;
+        struct picture got = draw(device, &room, &style, NULL), expected = draw(device, &room, &solid, NULL);
+        style.soft = PATINA_SOFT_OFF;
+        struct picture whole = draw(device, &room, &style, NULL);
+        const uint32_t changed = differing(&got, &whole);
+        printf("  %s, threshold %g: hiding changes %u pixels\n", name, (double)thresholds[k], changed);
+        assert_true(thresholds[k] < 1.0f ? changed > 100 : changed == 0);
+        assert_same(&got, &expected, name);
+        uint8_t picked[2][POINTS / 8];
+        for (int by_mask = 0; by_mask < 2; by_mask++) {
+            style.soft = PATINA_SOFT_HIDDEN;
+            patina_scene *scene = scene_with(&room, by_mask ? &solid : &style, NULL);
+            const patina_pick pick = {.struct_size = sizeof pick};
+            CHECK(patina_scene_set_camera(scene, &room.camera), scene);
+            CHECK(patina_scene_set_settings(scene, &room.settings), scene);
+            CHECK(patina_scene_pick(scene, NULL, &pick, NULL, picked[by_mask], sizeof picked[0]), scene);
+            patina_scene_destroy(scene);
+        }
+        assert_memory_equal(picked[0], picked[1], sizeof picked[0]);
+        picture_free(&got);
+        picture_free(&expected);
+        picture_free(&whole);
+        room_free(&room);
+    }
+}
+
+static void test_hidden(void **state)
+{
+    (void)state;
+    support_each_device(hide);
+}
+
 // One field serves every threshold, in one frame that keeps its shadows: as if drawn anew. At 1 nothing is soft.
 static void move(patina_device *device, const char *name)
 {
@@ -401,8 +441,9 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_divide),  cmocka_unit_test(test_threshold), cmocka_unit_test(test_modulation),
-        cmocka_unit_test(test_sources), cmocka_unit_test(test_histogram), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_divide),     cmocka_unit_test(test_hidden),  cmocka_unit_test(test_threshold),
+        cmocka_unit_test(test_modulation), cmocka_unit_test(test_sources), cmocka_unit_test(test_histogram),
+        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -41,24 +41,50 @@ static patina_light_desc light_of(int which)
     return light;
 }
 
-// A soft torus; probes: points everywhere about it, which take shadows and cast none.
+// A soft torus, or one ball; probes: points everywhere about it, or before and behind that ball, which take shadows and cast none.
 struct stage {
     struct points torus, probe;
     patina_cloud *soft, *probes;
     patina_scene *scene;
 };
 
-static struct stage set(uint32_t model, const patina_light_desc *light)
+static void strew(struct points *probe)
 {
-    struct stage stage = {points_torus(TORUS, 1.0, 0.4, POINTS_ALL, 6), points_create(PROBES, POINTS_NORMALS), NULL, NULL,
-                          NULL};
     struct pcg random = pcg_seed(3);
     for (uint64_t i = 0; i < PROBES; i++) {
         for (int k = 0; k < 2; k++)
-            stage.probe.position[3 * i + (uint64_t)k] = (float)pcg_between(&random, -1.8, 1.8);
-        stage.probe.position[3 * i + 2] = (float)pcg_between(&random, -0.9, 0.7);
-        stage.probe.normal[3 * i + 2] = 1.0f;
+            probe->position[3 * i + (uint64_t)k] = (float)pcg_between(&random, -1.8, 1.8);
+        probe->position[3 * i + 2] = (float)pcg_between(&random, -0.9, 0.7);
+        probe->normal[3 * i + 2] = 1.0f;
     }
+}
+
+// Along the light's ray through the ball's middle, from two radii before it to eight behind it.
+static void strew_along(struct points *probe, const float *ball, const patina_light_desc *light)
+{
+    struct pcg random = pcg_seed(3);
+    double ray[3], length = 0.0;
+    for (int k = 0; k < 3; k++) {
+        ray[k] = light->type == PATINA_LIGHT_SUN ? light->direction[k] : (double)ball[k] - light->position[k];
+        length += ray[k] * ray[k];
+    }
+    for (uint64_t i = 0; i < PROBES; i++) {
+        const double along = pcg_between(&random, -2.0, 8.0) * (double)radius / sqrt(length);
+        for (uint64_t k = 0; k < 3; k++)
+            probe->position[3 * i + k] = (float)((double)ball[k] + along * ray[k] +
+                                                 pcg_between(&random, -1.0, 1.0) * (double)radius);
+        probe->normal[3 * i + 2] = 1.0f;
+    }
+}
+
+static struct stage set_of(uint32_t model, const patina_light_desc *light, uint64_t balls)
+{
+    struct stage stage = {points_torus(balls, 1.0, 0.4, POINTS_ALL, 6), points_create(PROBES, POINTS_NORMALS), NULL, NULL,
+                          NULL};
+    if (balls > 1)
+        strew(&stage.probe);
+    else
+        strew_along(&stage.probe, stage.torus.position, light);
     stage.soft = points_upload(&stage.torus);
     stage.probes = points_upload(&stage.probe);
     patina_cloud_style style = soft_style(model), bare = PATINA_CLOUD_STYLE_INIT;
@@ -69,6 +95,8 @@ static struct stage set(uint32_t model, const patina_light_desc *light)
     CHECK(patina_scene_add_light(stage.scene, light), stage.scene);
     return stage;
 }
+
+static struct stage set(uint32_t model, const patina_light_desc *light) { return set_of(model, light, TORUS); }
 
 static void strike(struct stage *stage)
 {
@@ -175,6 +203,30 @@ static void test_truth(void **state)
 {
     (void)state;
     support_each_device(hold);
+}
+
+// One ball alone, whose middle is all that the light's map has to see: its depths hold the ball.
+static void hold_one(patina_device *device, const char *name)
+{
+    for (uint32_t model = 0; model < 3; model++)
+        for (int which = 0; which < 3; which++) {
+            const patina_light_desc light = light_of(which);
+            struct stage stage = set_of(model, &light, 1);
+            float *got = bake(device, stage.scene, 0, PROBES, 1);
+            const struct errors errors = compare(&stage, &light, model, got, &stage.probe);
+            printf("  %s, light %d, model %u, one ball: %.3f at most, %.4f in the mean; %.0f%% of the points in shadow\n", name,
+                   which, model, errors.worst, errors.mean, 100.0 * errors.dark);
+            assert_true(errors.dark > 0.1);
+            assert_true(errors.mean <= 0.006 && errors.worst <= 0.03);
+            free(got);
+            strike(&stage);
+        }
+}
+
+static void test_one_ball(void **state)
+{
+    (void)state;
+    support_each_device(hold_one);
 }
 
 // Devices agree to a step of 255 and how many samples there are of it.
@@ -335,8 +387,8 @@ static void test_pictures(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_truth),    cmocka_unit_test(test_devices),  cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_switches), cmocka_unit_test(test_pictures),
+        cmocka_unit_test(test_truth),   cmocka_unit_test(test_one_ball), cmocka_unit_test(test_devices),
+        cmocka_unit_test(test_threads), cmocka_unit_test(test_switches), cmocka_unit_test(test_pictures),
     };
     support_arguments(argc, argv);
     return cmocka_run_group_tests_name("soft shadows", tests, NULL, NULL);

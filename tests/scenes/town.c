@@ -4,7 +4,7 @@
 #include "clouds.h"
 #include "levels.h"
 #include "base/platform.h"
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 #include "support.h"
 
 #include <math.h>

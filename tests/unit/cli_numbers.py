@@ -156,7 +156,7 @@ def test_planes():
     files = sorted(path.name for path in (cli.FOLDER / "planes").iterdir())
     assert any(name.endswith(".txt") for name in files) and len(files) >= 4, files
     assert {"KEYS_0.raw", "FROM_0.raw", "NORMAL_0.raw", "DEFF_0.raw", "COMBINED_0.raw"} <= set(files), files
-    cli.run("render", "planes.ply", "--dump-planes", "no/such/folder", code=1)
+    assert "Check that its folder exists" in cli.run("render", "planes.ply", "--dump-planes", "no/such/folder", code=1).stderr
     found = []
     for number, (device, threads) in enumerate((("cpu", 1), ("cpu", 3), ("cpu-scalar", 2))):  # of discs: nothing of how threads came by
         folder = cli.FOLDER / f"discs-{number}"

@@ -302,8 +302,8 @@ def test_effects():
                ("--hatch", "1,8,0.5,1,0.2,0,0"), ("--fog", "1,6"), ("--fog", "1,6,0.5,0.9,0.1,0.1"), ("--focus", "2,0.3"),
                ("--paper", "0.4"), ("--paper", "0.1,0.9,0.8,0.6"))
     seen = {}
-    for effect in table.read():  # those that no choice shows: as Blender begins them
-        if effect["panel"] != "CAMERA" and not any(choice[0] == f"--{effect['name']}" for choice in effects):
+    for effect in table.own():  # those that no choice shows: as Blender begins them
+        if not any(choice[0] == f"--{effect['name']}" for choice in effects):
             begun = {field["name"]: field["start"] for field in effect["fields"] if "start" in field}
             effects += tuple(word for name, value in begun.items() for word in
                              ("--effect", f"{name}={','.join(map(str, value)) if isinstance(value, tuple) else value}")),

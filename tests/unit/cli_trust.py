@@ -63,7 +63,7 @@ def test_none_is_trusted():
     drawn = {}
     for least in (0.0, *levels[1:]):
         done = cli.run("render", "alone.ply", "-o", "alone.png", *VIEW, "--trust", f"{least:.6f}", "--stats", "json")
-        drawn[least] = (cli.read_png("alone.png")[3], json.loads(done.stdout), done.stderr.count("none of 60 points is trusted"))
+        drawn[least] = (cli.read_png("alone.png")[3], json.loads(done.stdout), done.stderr.count("alone.ply: none of 60 points is trusted"))
     everything = drawn[0.0][0]
     none = [least for least in drawn if drawn[least][1]["none_trusted"]]
     assert none and drawn[1.0][1]["none_trusted"] in (0, 60), "no threshold leaves all of them out"
@@ -71,3 +71,12 @@ def test_none_is_trusted():
         assert warnings == (least in none) and told["none_trusted"] == 60 * (least in none), (least, told)
         assert (picture == everything) or least not in none, least
     assert not drawn[0.0][2]
+
+
+def test_the_file_is_named():
+    """Of two files, the warning names the one in which no point is trusted."""
+    strays("alone.ply", 60, 0)
+    cli.ball("whole.ply", 3000)
+    done = cli.run("render", "whole.ply", "alone.ply", "-o", "x.png", *VIEW, "--trust", "1")
+    warned = [line for line in done.stderr.splitlines() if "is trusted, so all of them are drawn" in line]
+    assert len(warned) == 1 and "alone.ply: none of 60 points" in warned[0], done.stderr

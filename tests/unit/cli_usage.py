@@ -45,7 +45,7 @@ def test_values_behind_equals():
     shutil.copy(cli.FOLDER / "equals.ply", cli.FOLDER / "--odd=name.ply")
     cli.run("render", "-o", "odd.png", "--size=40x30", "--", "--odd=name.ply")
     cli.run("analyse", "equals.ply", "-o", "equals-out.ply", "--neighbours=8")
-    for arguments, said in ((["--lit=yes"], "'--lit' takes no value"), (["--size="], "'' is no value for option '--size'"),
+    for arguments, said in ((["--lit=yes"], "'--lit' takes no value"), (["--size="], "'' is no value for option '--size': see 'patina help --size'"),
                             (["--nonsense=1"], "there is no option '--nonsense'")):
         done = cli.run("render", "equals.ply", "-o", "x.png", *arguments, code=2)
         assert said in done.stderr, done.stderr

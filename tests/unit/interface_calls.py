@@ -15,13 +15,19 @@ THREADS, SECONDS_OF_THREADS = 2, 6.0
 NEVER = {"patina_progress_cancel", "patina_frame_cancel"}
 
 
+def end(timer: threading.Timer) -> None:
+    """What it cancels may be destroyed afterwards."""
+    timer.cancel()
+    timer.join()
+
+
 def draw(stage: Stage) -> None:
     """The scene, such as it is by now: any code, and it comes back."""
     frame, scene = stage.handle("frame"), stage.handle("scene")
     timer = threading.Timer(DRAWN, lambda: stage.call("patina_frame_cancel", frame))
     timer.start()
     code = stage.call("patina_frame_render", frame, scene)
-    timer.cancel()
+    end(timer)
     assert code in CODES, code
 
 
@@ -44,7 +50,7 @@ def finish(stage: Stage, function: str, arguments: list, parameters: list) -> No
 
 def try_call(stage: Stage, function: str, parameters: list, place: int = -1, argument: object = None) -> object:
     arguments = [argument if i == place else stage.good(function, kind, name) for i, (kind, name) in enumerate(parameters)]
-    drawn = [i for i, (kind, _) in enumerate(parameters) if "patina_frame *" in kind or "patina_frame*" in kind]
+    drawn = [i for i, (kind, _) in enumerate(parameters) if kind.replace("const", "").replace(" ", "") == "patina_frame*"]
     timer = None
     if drawn and arguments[drawn[0]] and function != "patina_frame_destroy":
         frame = arguments[drawn[0]]
@@ -52,7 +58,7 @@ def try_call(stage: Stage, function: str, parameters: list, place: int = -1, arg
         timer.start()
     result = getattr(stage.library, function)(*arguments)
     if timer:
-        timer.cancel()
+        end(timer)
     finish(stage, function, arguments, parameters)
     return result
 

@@ -15,7 +15,7 @@ import abi  # noqa: E402
 POINTS, ROOM, SIDE, TEXELS = 64, 64 * 64, 16, 32  # arrays are wider than their count, so that another type or stride reads what is there
 CODES = set(abi.ERROR.values())
 DESTROYS = {"progress", "device", "cloud", "mesh", "texture", "mask", "grade", "field", "scans", "scene", "frame", "file", "task", "builder",
-            "rows"}
+            "rows", "drawing"}
 
 
 def declarations() -> dict[str, list[tuple[str, str]]]:
@@ -113,11 +113,24 @@ class Stage:
         return abi.GridDesc(count=POINTS, position=ctypes.addressof(self.singles), column=ctypes.addressof(self.indices),
                             row=ctypes.addressof(self.zeros))
 
+    def _distance_desc(self) -> abi.DistanceDesc:
+        return abi.DistanceDesc(count=POINTS, other_count=POINTS, position=self.array("position"), normal=self.array("normal"),
+                                other=self.array("position"), normal_scale=.5, cylinder=.5, depth=1, threads=1)
+
+    def _ground_desc(self) -> abi.GroundDesc:
+        return abi.GroundDesc(count=POINTS, position=self.array("position"), cell=.1, threads=1)
+
     def _pages_desc(self) -> abi.PagesDesc:
         page = abi.Page((0, 0, 0), (1, 1, 1), .1, POINTS, 0xFFFFFFFF)  # the last: PATINA_NO_PAGE
         self.kept.append(page)
         return abi.PagesDesc(pages=ctypes.addressof(page), page_count=1, color_type=abi.TYPE["UINT8"], has_normals=1, has_scalars=1,
                              has_classes=1)
+
+    def _drawing_desc(self) -> abi.DrawingDesc:
+        return abi.DrawingDesc(origin=(.5, .5, .5), right=(1, 0, 0), up=(0, 1, 0), extent=(2, 2), front=1, back=1, scale=10)
+
+    def _contour_desc(self) -> abi.ContourDesc:
+        return abi.ContourDesc(interval=.1, cell=.1, threads=1)
 
     def _part(self) -> abi.Part:
         return abi.Part(part=1, of=2)
@@ -234,6 +247,9 @@ class Stage:
     def new_builder(self) -> ctypes.c_void_p:
         return self.make("patina_builder_begin", self.path("new"), None)
 
+    def new_drawing(self) -> ctypes.c_void_p:
+        return self.make("patina_drawing_create", ctypes.byref(self._drawing_desc()))
+
     def new_task(self) -> ctypes.c_void_p:
         return self.make("patina_task_build", ctypes.byref(self._cloud_desc()), None)
 
@@ -273,6 +289,8 @@ class Stage:
             return self.path("folder")
         if function in ("patina_file_open", "patina_rows_open", "patina_cloud_load", "patina_task_open_file"):
             return self.path("ply")
+        if function == "patina_drawing_write":
+            return self.path("new") + b".svg"
         return self.path("new")
 
     def _void(self, function: str, name: str) -> object:
@@ -282,6 +300,10 @@ class Stage:
             faces = (ctypes.c_void_p * 6)(*[ctypes.addressof(self.out)] * 6)
             self.kept.append(faces)
             return faces
+        if name == "clouds":
+            clouds = (ctypes.c_void_p * 1)(self.handle("cloud"))
+            self.kept.append(clouds)
+            return clouds
         if name == "paths":
             paths = (ctypes.c_void_p * 2)()
             self.kept += [paths, ctypes.c_char_p(self.path("keys"))]
@@ -293,7 +315,7 @@ class Stage:
         if stars:
             source = {"double": self.floats, "uint16_t": self.zeros, "uint8_t": self.bytes}.get(plain, self.singles)
             writes = name in ("xyz", "rgba", "values", "pixels", "keys", "numbers", "bits", "count", "round", "size", "range", "colors",
-                              "normals", "box_min", "box_max", "pages", "level")
+                              "normals", "box_min", "box_max", "pages", "level", "distance", "interval", "height", "ground")
             return ctypes.cast(self.out if writes or "read" in function else source, ctypes.c_void_p)
         sizes = {"patina_mask_create": POINTS // 8, "patina_scene_pick": POINTS // 8, "patina_frame_read": SIDE * SIDE * 16,
                  "patina_frame_read_layer": SIDE * SIDE * 16, "patina_frame_read_keys": SIDE * SIDE * 8,

@@ -66,6 +66,15 @@ class Abi(unittest.TestCase):
         self.assertEqual(sorted(name for name in exported if name.startswith("patina_")), sorted(abi.CALLS))
         self.assertLessEqual(set(abi.RESULTS), set(abi.CALLS))
 
+    def test_the_library_gives_the_sizes(self) -> None:
+        """patina_struct_size gives the compiler's size of each structure of the headers, and 0 for other names."""
+        size_of = ctypes.CDLL(LIBRARY).patina_struct_size
+        size_of.argtypes, size_of.restype = abi.CALLS["patina_struct_size"], abi.RESULTS["patina_struct_size"]
+        structures = {c_name(name): ctypes.sizeof(value) for name, value in vars(abi).items()
+                      if isinstance(value, type) and issubclass(value, ctypes.Structure) and hasattr(value, "_fields_")}
+        self.assertEqual({name: size_of(name.encode()) for name in structures}, structures)
+        self.assertEqual([size_of(name) for name in (None, b"", b"camera", b"patina_none")], [0, 0, 0, 0])
+
     def test_effects_are_the_table_s(self) -> None:
         """Every row of effects.def is a field of the structure, in its order; ranges hold what Blender begins with."""
         fields = [field for effect in abi.EFFECTS for field in effect["fields"]]

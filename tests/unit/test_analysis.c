@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What every point knows: neighbours against all distances, kinds and footprints on known shapes, hard cases, cancel.
 #include "scene/soft.h"
-#include "scene/analysis.h"
+#include "scene/analysis/analysis.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 #include "shared/words.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Beams: a station's interval is found from its samples; footprints end at its cells, and at half of them beside bars.
-#include "scene/analysis.h"
-#include "scene/beams.h"
+#include "scene/analysis/analysis.h"
+#include "scene/analysis/beams.h"
 #include "scenes/support.h"
 
 #include <math.h>

@@ -11,19 +11,27 @@ sys.dont_write_bytecode = True
 sys.path[1:1] = [str(Path(__file__).resolve().parents[2] / folder) for folder in ("build", "tests")]
 import cli  # noqa: E402
 import cli_analysis  # noqa: E402
+import cli_batches  # noqa: E402
 import cli_borders  # noqa: E402
 import cli_colors  # noqa: E402
+import cli_drawings  # noqa: E402
 import cli_files  # noqa: E402
+import cli_maps  # noqa: E402
+import cli_measure  # noqa: E402
 import cli_numbers  # noqa: E402
+import cli_outlines  # noqa: E402
 import cli_pictures  # noqa: E402
 import cli_ranges  # noqa: E402
+import cli_rasters  # noqa: E402
+import cli_sheets  # noqa: E402
+import cli_styles  # noqa: E402
 import cli_trust  # noqa: E402
 import cli_usage  # noqa: E402
 from runs import run_tests  # noqa: E402
 
 
 def main():
-    modules = (cli_analysis, cli_colors, cli_usage, cli_pictures, cli_borders, cli_numbers, cli_files, cli_ranges, cli_trust)
+    modules = (cli_analysis, cli_colors, cli_drawings, cli_rasters, cli_maps, cli_sheets, cli_batches, cli_styles, cli_outlines, cli_usage, cli_pictures, cli_borders, cli_numbers, cli_files, cli_ranges, cli_trust, cli_measure)
     tests = {name: test for module in modules for name, test in vars(module).items() if name.startswith("test_")}
     with tempfile.TemporaryDirectory() as folder:
         cli.FOLDER = Path(folder)

@@ -305,6 +305,13 @@ static int face_camera(void *to)
     return patina_panorama_camera(&panorama, 1, to, &side);
 }
 
+static int picked(void *to)
+{
+    static const double corners[6] = {0, 0, 16, 0, 16, 16}, place[2] = {8, 8};
+    const patina_pick pick = {.struct_size = sizeof pick, .polygon = corners, .corners = 3, .threads = 1};
+    return patina_scene_pick_nearest(stage.scene, NULL, &pick, place, NULL, to);
+}
+
 static unsigned char *filled(const char *name, int (*call)(void *), size_t size)
 {
     unsigned char *to = malloc(size);
@@ -357,6 +364,7 @@ static void test_what_is_written(void **state)
     check_output("patina_file_attribute", file_attribute, sizeof(patina_file_attribute));
     check_output("patina_frame_stats", frame_stats, sizeof(patina_frame_stats));
     check_output("patina_scene_frame_camera", framed_camera, sizeof(patina_camera));
+    check_output("patina_scene_pick_nearest", picked, sizeof(patina_picked));
     check_output("patina_panorama_camera", face_camera, sizeof(patina_camera));
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Free space: what a station saw through is marked, and nothing else; hidden and shown in pictures.
-#include "scene/analysis.h"
-#include "scene/free_space.h"
+#include "scene/analysis/analysis.h"
+#include "scene/analysis/free_space.h"
+#include "scene/clouds/shape_word.h"
 #include "scenes/support.h"
 
 #include <math.h>
@@ -121,6 +122,15 @@ static uint64_t read_marks(patina_cloud *cloud, uint8_t *marks)
     return info.seen_through;
 }
 
+// Slots whose point has another surface beside its own.
+static uint64_t count_beside(const patina_cloud *cloud)
+{
+    uint64_t count = 0;
+    for (uint64_t i = 0; i < cloud->slots; i++)
+        count += (cloud->shapes[i] & PT_SHAPE_BESIDE) != 0;
+    return count;
+}
+
 static void test_marks(void **state)
 {
     static uint8_t marks[MOST], again[MOST];
@@ -148,9 +158,11 @@ static void test_marks(void **state)
         CHECK(patina_cloud_analyse(cloud, &desc, NULL), cloud);
         assert_int_equal(read_marks(cloud, again), count);
         assert_memory_equal(marks, again, scan.count);
+        uint64_t beside = count_beside(cloud);
         desc.free_space = 0; // forgets
         CHECK(patina_cloud_analyse(cloud, &desc, NULL), cloud);
         assert_int_equal(read_marks(cloud, again), 0);
+        assert_int_equal(count_beside(cloud), beside); // looking through leaves no bit of its own behind
         patina_cloud_destroy(cloud);
         free_scan(&scan);
     }

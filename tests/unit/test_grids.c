@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What scanners' grids tell: normals that neighbours in space would mix, and borders exactly where depth steps or nothing came back.
 #include "shared/words.h"
-#include "scene/analysis.h"
+#include "scene/analysis/analysis.h"
 #include "scenes/support.h"
 
 #include <math.h>

@@ -28,7 +28,7 @@ from names import chosen  # noqa: E402
 
 SECONDS = 300  # that a function may take with all of its cases
 FLOATS = (float("nan"), float("inf"), float("-inf"), 0.0, -1.0, 3.4e38, 1e308, -1e308, 5e-324)
-COUNTS = {"count", "page_count", "vertex_count", "triangle_count", "ramp_count", "station_count", "direction_count", "corners", "room",
+COUNTS = {"count", "other_count", "page_count", "vertex_count", "triangle_count", "ramp_count", "station_count", "direction_count", "corners", "room",
           "stride", "width", "height"}  # what arrays of the caller go by
 
 

@@ -1,26 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """build/check_manual finds the faults that it is there to find, and build/package makes pages whose links and images exist."""
 
-import importlib.machinery
-import importlib.util
 import re
 import subprocess
 import sys
 import unittest
-from pathlib import Path
-from types import ModuleType
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.dont_write_bytecode = True
-
-
-def script(name: str) -> ModuleType:
-    """A script of build/ as a module."""
-    loader = importlib.machinery.SourceFileLoader(name, str(ROOT / "build" / name))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
-    loader.exec_module(module)
-    return module
-
+from scripts import ROOT, run, script
 
 check = script("check_manual")
 WORDS = " ".join(["word"] * 36)
@@ -90,6 +76,12 @@ class Named(unittest.TestCase):
                          ["the manual does not name the option --soft-shells (soft.c)"])
         self.assertTrue([fault for fault in check.missing(text.replace("*Keep Every*", "it")) if "*Keep Every*" in fault])
 
+    def test_styles(self) -> None:
+        page = (ROOT / "addon/manual/styles.md").read_text(encoding="utf-8")
+        self.assertEqual(list(check.styles(page)), [])
+        self.assertEqual(list(check.styles(page.replace("| *Museum* |", "| it |"))),
+                         ["museum.json: add a row '| *Museum* | what it shows |' to the table in addon/manual/styles.md"])
+
     def test_all_holds(self) -> None:
         done = subprocess.run([sys.executable, ROOT / "build/check_manual"], capture_output=True, text=True, check=False)
         self.assertEqual((done.returncode, done.stdout), (0, "1 passed, 0 failed, 0 skipped\n"))
@@ -118,9 +110,4 @@ class Pages(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    result = unittest.main(exit=False).result
-    failed, skipped = len(result.failures) + len(result.errors), len(result.skipped)
-    for _, reason in result.skipped:
-        print(f"skip {reason}")
-    print(f"{result.testsRun - failed - skipped} passed, {failed} failed, {skipped} skipped")
-    sys.exit(bool(failed))
+    sys.exit(run())

@@ -1,19 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """build/matrix claims nothing that was not run: python3 tests/unit/test_matrix.py"""
 
-import importlib.util
 import json
 import sys
 import tempfile
 import unittest
-from importlib.machinery import SourceFileLoader
 from pathlib import Path
 
-PATH = Path(__file__).resolve().parents[2] / "build/matrix"
-sys.dont_write_bytecode = True
-loader = SourceFileLoader("matrix", str(PATH))
-matrix = importlib.util.module_from_spec(importlib.util.spec_from_loader("matrix", loader))
-loader.exec_module(matrix)
+from scripts import run, script
+
+matrix = script("matrix")
 
 
 def setting(blender="5.2.2 LTS", graphics="none", run="background tests", part=(1, 1), whole=True):
@@ -90,4 +86,4 @@ class Matrix(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    sys.exit(run())

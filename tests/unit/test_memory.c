@@ -2,7 +2,7 @@
 // Anonymous memory of a cloud: at most 24 bytes a point at rest (position, colour, normal), at most 16 more while it is
 // built; the caller's own arrays are not counted. Measured by the kernel's own books, not by the library's.
 #include "sanitized.h"
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 

@@ -12,6 +12,7 @@ import re
 import struct
 import subprocess
 import sys
+import tarfile
 import tempfile
 import zipfile
 from pathlib import Path
@@ -139,10 +140,8 @@ def validate(path):
 
 def check_sources(data, library):
     """The library's sources are whole: CMake finds each of them, no kernel lacks its twin, and they have the library's version."""
-    with tempfile.TemporaryDirectory() as scratch, zipfile.ZipFile(io.BytesIO(data)) as archive:
-        for entry in archive.infolist():
-            mode = entry.external_attr >> 16
-            Path(archive.extract(entry, scratch)).chmod(mode)
+    with tempfile.TemporaryDirectory() as scratch, tarfile.open(fileobj=io.BytesIO(data)) as archive:
+        archive.extractall(scratch)
         root = next(Path(scratch).iterdir())
         for command in (["build/check_twins", "--quiet"], ["cmake", "--preset", "release", "-S", "build"],
                         ["ninja", "-C", "build/out/release", "-n", "libpatina.so"], ["build/stamp", "version.c"]):
@@ -152,7 +151,14 @@ def check_sources(data, library):
         assert version.encode() + b"\0" in library, f"the sources are {version}; the library is not"
 
 
+def check_notices(path):
+    """No file of unknown origin, and notices of all others."""
+    done = subprocess.run([ROOT / "build/notices", "--check", path], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def check(platform, path):
+    check_notices(path)
     system, processor = platform.split("-")
     legacy = path.stem.endswith("-legacy")
     with zipfile.ZipFile(path) as archive:
@@ -171,7 +177,7 @@ def check(platform, path):
             assert listed == {name for name in archive.namelist() if name.startswith("wheels/")}, listed
             assert all(f"## {name.removeprefix('wheels/')}\n" in told for name in listed) and "not said" not in told, told
             if platform == "linux-x64":
-                check_sources(archive.read("docs/sources.zip"), data)
+                check_sources(archive.read("docs/sources.tar.xz"), data)
             assert all("-py3-none-" in name for name in listed), f"bound to one Python, others could not enable it: {listed}"
         packed = [name for name in archive.namelist() if "lazrs" in name and (name.endswith(".whl") or ".dist-info/METADATA" in name)]
         assert packed or platform == "windows-arm64", "no lazrs"  # of which PyPI has no wheel

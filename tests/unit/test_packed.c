@@ -2,8 +2,8 @@
 // Packed positions, and files without an order (SPEC 13): what they may be off by, that all who read points on the host find floats at their
 // places, what numbers points have, files of the versions before, and heads that lie.
 #include "base/platform.h"
-#include "scene/analysis.h"
-#include "scene/fingerprint.h"
+#include "scene/analysis/analysis.h"
+#include "scene/clouds/fingerprint.h"
 #include "scenes/clouds.h"
 #include "scenes/packed.h"
 #include "scenes/support.h"

@@ -3,8 +3,8 @@
 #include "base/pool.h"
 #include "plan/passes.h"
 #include "sanitized.h"
-#include "scene/paged.h"
-#include "scene/parts.h"
+#include "scene/clouds/paged.h"
+#include "scene/clouds/parts.h"
 #include "scenes/support.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Single points: masks in pictures and shadows on every device, picking against brute force in float64, grades of scans.
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 
@@ -386,6 +386,137 @@ static void test_pick(void **state)
     free(expected);
 }
 
+// Where a point falls in the image.
+static void project_point(const struct stage *s, uint32_t i, double at[2])
+{
+    const float *p = s->points.position + 3 * i;
+    double world[3], z;
+    for (int r = 0; r < 3; r++)
+        world[r] = s->matrix[4 * r] * (double)p[0] + s->matrix[4 * r + 1] * (double)p[1] + s->matrix[4 * r + 2] * (double)p[2] +
+                   s->matrix[4 * r + 3];
+    camera_project(&s->camera, SIZE, SIZE, world, &at[0], &at[1], &z);
+}
+
+// By brute force: the nearest of the picked points, as patina_scene_pick gives them.
+static void check_nearest(const struct stage *s, const patina_scene *scene, const patina_frame *frame, const patina_pick *pick,
+                          const double place[2])
+{
+    uint8_t bits[BYTES];
+    CHECK(patina_scene_pick(scene, frame, pick, NULL, bits, BYTES), scene);
+    double least = INFINITY;
+    uint32_t wanted = TORUS;
+    for (uint32_t i = 0; i < TORUS; i++) {
+        double at[2];
+        if (!bit_of(bits, i))
+            continue;
+        project_point(s, i, at);
+        const double squared = (at[0] - place[0]) * (at[0] - place[0]) + (at[1] - place[1]) * (at[1] - place[1]);
+        wanted = squared < least ? i : wanted;
+        least = fmin(least, squared);
+    }
+    patina_picked found = {.struct_size = sizeof found};
+    CHECK(patina_scene_pick_nearest(scene, frame, pick, place, NULL, &found), scene);
+    assert_int_equal(found.found, wanted < TORUS);
+    if (wanted == TORUS)
+        return;
+    assert_int_equal(found.number, wanted);
+    assert_true(fabs(found.distance - sqrt(least)) < 1e-5); // chunks hold positions as float32, 50 pixels a unit
+    for (int k = 0; k < 3; k++)
+        assert_true(fabs(found.position[k] - (double)s->points.position[3 * wanted + (uint32_t)k]) < 1e-6);
+}
+
+static void test_nearest(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    for (int ortho = 0; ortho < 2; ortho++) {
+        struct stage *s = make(ortho);
+        patina_cloud_style style = {0};
+        patina_scene *scene = scene_with(s, &style);
+        patina_frame *frame = NULL;
+        CHECK(patina_frame_create(device, &frame), device);
+        CHECK(patina_frame_render(frame, scene), frame);
+        uint32_t some = 0;
+        for (int y = 5; y < SIZE; y += SIZE / 6)
+            for (int x = 5; x < SIZE; x += SIZE / 6) {
+                const double place[2] = {x + 0.3, y + 0.7}, r = 6.0;
+                const double around[8] = {place[0] - r, place[1] - r, place[0] + r, place[1] - r,
+                                          place[0] + r, place[1] + r, place[0] - r, place[1] + r};
+                for (uint32_t threads = 1; threads < 4; threads += 2) {
+                    const patina_pick pick = {.struct_size = sizeof pick, .polygon = around, .corners = 4, .threads = threads};
+                    check_nearest(s, scene, frame, &pick, place);
+                    check_nearest(s, scene, NULL, &pick, place);
+                }
+                some++;
+            }
+        assert_true(some >= 36);
+        const double place[2] = {NAN, 0}, good[2] = {1, 1};
+        const patina_pick none = {.struct_size = sizeof none};
+        patina_picked found = {.struct_size = sizeof found};
+        assert_int_equal(patina_scene_pick_nearest(scene, NULL, &none, good, NULL, &found), PATINA_ERROR_ARGUMENT);
+        const double around[6] = {0, 0, 9, 0, 9, 9};
+        const patina_pick pick = {.struct_size = sizeof pick, .polygon = around, .corners = 3};
+        assert_int_equal(patina_scene_pick_nearest(scene, NULL, &pick, place, NULL, &found), PATINA_ERROR_ARGUMENT);
+        assert_int_equal(patina_scene_pick_nearest(scene, NULL, &pick, NULL, NULL, &found), PATINA_ERROR_ARGUMENT);
+        assert_int_equal(patina_scene_pick_nearest(scene, NULL, &pick, good, NULL, NULL), PATINA_ERROR_ARGUMENT);
+        patina_frame_destroy(frame);
+        patina_scene_destroy(scene);
+        clear(s);
+    }
+    patina_device_destroy(device);
+}
+
+// ---- ranges of ramps ------------------------------------------------------------------------------------------------------
+
+// Automatic ends hold all points and are as far apart as they are, but for boxes of chunks; given ones are as given.
+static void test_ramp_ranges(void **state)
+{
+    (void)state;
+    struct stage *s = make(0);
+    double heights[2] = {INFINITY, -INFINITY}, distances[2] = {INFINITY, -INFINITY}, range[2];
+    for (uint32_t i = 0; i < TORUS; i++) {
+        double away[3], world[3];
+        const float *p = s->points.position + 3 * i;
+        for (int r = 0; r < 3; r++) {
+            world[r] = s->matrix[4 * r] * (double)p[0] + s->matrix[4 * r + 1] * (double)p[1] +
+                       s->matrix[4 * r + 2] * (double)p[2] + s->matrix[4 * r + 3];
+            away[r] = world[r] - s->camera.world_from_camera[4 * r + 3];
+        }
+        const double distance = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]);
+        heights[0] = fmin(heights[0], world[2]);
+        heights[1] = fmax(heights[1], world[2]);
+        distances[0] = fmin(distances[0], distance);
+        distances[1] = fmax(distances[1], distance);
+    }
+    for (uint32_t source = PATINA_COLOR_HEIGHT; source <= PATINA_COLOR_TRUST; source++) {
+        patina_cloud_style style = {.color_source = source};
+        patina_scene *scene = scene_with(s, &style);
+        CHECK(patina_scene_ramp_range(scene, 0, range), scene);
+        const double *inner = source == PATINA_COLOR_HEIGHT ? heights : source == PATINA_COLOR_DISTANCE ? distances : NULL;
+        if (inner) {
+            const double slack = 0.25 * (inner[1] - inner[0]);
+            assert_true(range[0] <= inner[0] + 1e-6 && range[0] > inner[0] - slack);
+            assert_true(range[1] >= inner[1] - 1e-6 && range[1] < inner[1] + slack);
+        }
+        if (source == PATINA_COLOR_TRUST)
+            assert_true(range[0] == 0.0 && range[1] == 1.0);
+        patina_scene_destroy(scene);
+        style = (patina_cloud_style){.color_source = source, .ramp_range = {-2.0f, 7.0f}};
+        scene = scene_with(s, &style);
+        CHECK(patina_scene_ramp_range(scene, 0, range), scene);
+        assert_true(range[0] == -2.0 && range[1] == 7.0);
+        assert_int_equal(patina_scene_ramp_range(scene, 1, range), PATINA_ERROR_ARGUMENT);
+        patina_scene_destroy(scene);
+    }
+    patina_scene *scene = NULL;
+    const patina_cloud_style style = {.struct_size = sizeof style, .color_source = PATINA_COLOR_DISTANCE};
+    CHECK(patina_scene_create(&scene), NULL);
+    CHECK(patina_scene_add_cloud(scene, s->cloud, &style), scene);
+    assert_int_equal(patina_scene_ramp_range(scene, 0, range), PATINA_ERROR_ARGUMENT); // no camera
+    patina_scene_destroy(scene);
+    clear(s);
+}
+
 // ---- grades ---------------------------------------------------------------------------------------------------------------
 
 static double linear_of(double srgb) { return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4); }
@@ -529,6 +660,8 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(test_hidden_points_cast_no_shadow),
                                        cmocka_unit_test(test_highlight),
                                        cmocka_unit_test(test_pick),
+                                       cmocka_unit_test(test_nearest),
+                                       cmocka_unit_test(test_ramp_ranges),
                                        cmocka_unit_test(test_grades),
                                        cmocka_unit_test(test_refusals)};
     return cmocka_run_group_tests(tests, NULL, NULL);

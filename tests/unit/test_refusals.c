@@ -83,10 +83,12 @@ static void test_picture_survives_memory_cap(void **state)
     struct stage stage = set_stage(stats.plane_bytes);
     assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
     float *before = read_picture(&stage);
+    assert_int_equal(patina_frame_check(stage.frame, stage.scene), PATINA_OK);
     static const uint32_t sizes[] = {SIDE + 1, SIDE + 60, 700, 2000};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         set_size(stage.scene, sizes[i], sizes[i]);
-        assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_MEMORY);
+        assert_int_equal(patina_frame_check(stage.frame, stage.scene), PATINA_ERROR_TOO_LARGE);
+        assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_TOO_LARGE);
         assert_message(stage.frame, "MB allowed");
         float *after = read_picture(&stage);
         assert_memory_equal(before, after, (size_t)SIDE * SIDE * 16);
@@ -94,6 +96,61 @@ static void test_picture_survives_memory_cap(void **state)
     }
     free(before);
     clear_stage(&stage);
+}
+
+// Two plates of points a tenth of a thousandth apart: a light's map is as large as it may be.
+static patina_cloud *plates(void)
+{
+    enum { ACROSS = 60 };
+    static float points[2 * ACROSS * ACROSS][3];
+    for (int i = 0; i < 2 * ACROSS * ACROSS; i++) {
+        const int k = i / 2;
+        points[i][0] = (float)(k % ACROSS) * 1e-4f + (float)(i % 2);
+        points[i][1] = (float)(k / ACROSS) * 1e-4f + (float)(i % 2);
+        points[i][2] = 0.2f * (float)(i % 2);
+    }
+    const patina_cloud_desc desc = {
+        .struct_size = sizeof desc, .count = sizeof points / sizeof *points, .position = {points, PATINA_FLOAT32, 3, 0}};
+    patina_cloud *cloud = NULL;
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
+    return cloud;
+}
+
+static void set_resolution(patina_scene *scene, uint32_t resolution)
+{
+    patina_settings settings = {.struct_size = sizeof settings, .width = 64, .height = 64, .shadow_resolution = resolution};
+    assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+}
+
+static void test_light_map_above_memory_cap(void **state)
+{
+    (void)state;
+    struct stage stage = set_stage(32 << 20);
+    patina_cloud *cloud = plates();
+    const patina_light_desc sun = {
+        .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .direction = {0.1, 0.2, -1}, .color = {1, 1, 1}, .shadows = 1};
+    patina_scene_clear(stage.scene);
+    assert_int_equal(patina_scene_add_cloud(stage.scene, cloud, NULL), PATINA_OK);
+    assert_int_equal(patina_scene_add_light(stage.scene, &sun), PATINA_OK);
+    patina_camera camera = {.struct_size = sizeof camera};
+    assert_int_equal(patina_scene_frame_camera(stage.scene, 30, 40, 0, &camera), PATINA_OK);
+    assert_int_equal(patina_scene_set_camera(stage.scene, &camera), PATINA_OK);
+    for (int i = 0; i < 2; i++) {
+        set_resolution(stage.scene, 256);
+        assert_int_equal(patina_frame_check(stage.frame, stage.scene), PATINA_OK);
+        assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
+        patina_frame_stats stats = {.struct_size = sizeof stats};
+        assert_int_equal(patina_frame_get_stats(stage.frame, &stats), PATINA_OK);
+        assert_true(stats.shadow_height > 200);
+        set_resolution(stage.scene, 16384);
+        assert_int_equal(patina_frame_check(stage.frame, stage.scene), PATINA_ERROR_TOO_LARGE);
+        assert_message(stage.frame, "lower the shadow resolution");
+        assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_TOO_LARGE);
+        assert_message(stage.frame, "lower the shadow resolution");
+        assert_true(patina_frame_progress(stage.frame) == 0.0f); // nothing was drawn
+    }
+    clear_stage(&stage);
+    patina_cloud_destroy(cloud);
 }
 
 static void test_cancel_ends_with_its_render(void **state)
@@ -259,6 +316,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_picture_survives_memory_cap),
+        cmocka_unit_test(test_light_map_above_memory_cap),
         cmocka_unit_test(test_cancel_ends_with_its_render),
         cmocka_unit_test(test_bad_lights_and_shadows),
         cmocka_unit_test(test_lights_end_at_32),

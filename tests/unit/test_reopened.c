@@ -2,7 +2,7 @@
 // Closed surface that a station looked through: taken back where free space is used, magenta where it is shown; equal on every
 // device, for any threads, and in regions; kept in saved clouds.
 #include "plan/plan.h"
-#include "scene/cloud.h"
+#include "scene/clouds/cloud.h"
 #include "scenes/support.h"
 
 #include <math.h>

@@ -18,7 +18,7 @@ class Rooms(unittest.TestCase):
         made = tempfile.TemporaryDirectory()
         self.addCleanup(made.cleanup)
         self.folder = Path(made.name)
-        for name in ("native", "shaders", "addon"):
+        for name in ("native", "shaders", "addon", "python"):
             shutil.copytree(ROOT / name, self.folder / name, ignore=shutil.ignore_patterns("glad", "__pycache__", "presets"))
         (self.folder / "build").mkdir()
         shutil.copy(ROOT / "build/check_rooms", self.folder / "build")
@@ -50,6 +50,7 @@ class Rooms(unittest.TestCase):
                  "words = (c_int * 4).from_buffer(layer)")
         for line in lines:
             self.refuses("addon/sync/points/clouds.py", line, "addon/sync/points/clouds.py:", "memory by its address", READER)
+        self.refuses("python/patina_render/renders.py", "import ctypes", "python/patina_render/renders.py:", "memory by its address")
         number = len((self.folder / "addon/draw/viewport.py").read_text(encoding="utf-8").splitlines()) + 2
         self.refuses("addon/draw/viewport.py", "import ctypes", f"addon/draw/viewport.py:{number}:")
         for name in (READER, "addon/native/__init__.py"):
@@ -59,7 +60,7 @@ class Rooms(unittest.TestCase):
 
     def test_rooms_and_circles(self) -> None:
         self.refuses("native/plan/effects.c", '#include "run/frame.h"', "plan may not know run")
-        self.refuses("native/scene/cloud.c", "#include <pthread.h>", "operating system")
+        self.refuses("native/scene/clouds/cloud.c", "#include <pthread.h>", "operating system")
         self.refuses("native/plan/plan.h", '#include "passes.h"', "a circle")
 
     def test_imports_of_the_addon_go_one_way(self) -> None:

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Vectors answer as the header says where processors differ: minimum and maximum of what is not a number and of two zeros,
-// conversion of what no integer holds, shifts, packing. Compiled for the first instruction set with vectors that the processor has.
+// conversion of what no integer holds, shifts, packing. Compiled for each instruction set with vectors that the compiler has: test_simd for
+// the first, test_simd_LEVEL for the others.
+#include "base/platform.h"
 #include "device_cpu/cpu.h"
 #include "device_cpu/simd.h"
+#include "device_cpu/tables.h"
 
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -149,8 +153,25 @@ static void test_no_lanes(void **state)
     }
 }
 
+// Of this build.
+static enum pt_vectors level(void)
+{
+#if defined(PT_ISA_AVX512)
+    return PT_VECTORS_AVX512;
+#elif defined(PT_ISA_AVX2)
+    return PT_VECTORS_AVX2;
+#else
+    return PT_VECTORS_NONE;
+#endif
+}
+
 int main(void)
 {
+    if (level() > pt_processor_vectors()) {
+        puts("skip all: this processor lacks the instruction set\n0 passed, 0 failed, 4 skipped");
+        return 0;
+    }
+    pt_cpu_tables_fill(); // which vi_pack looks up; a device does so
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pairs_of_odd_numbers),
         cmocka_unit_test(test_conversions),

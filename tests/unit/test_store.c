@@ -2,8 +2,8 @@
 // Analyses whose arrays lie on the disk, held so little of that everything is given back many times over: the bytes of those in memory,
 // whatever the points are. Files of saved clouds likewise; what is cancelled, killed or has no room on the disk leaves no file.
 #include "base/platform.h"
-#include "scene/analysis.h"
-#include "scene/page_sums.h"
+#include "scene/analysis/analysis.h"
+#include "scene/clouds/page_sums.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 

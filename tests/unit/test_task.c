@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tasks: the work of a call on a thread of its own, with its code and message; waiting, cancelling, letting go meanwhile.
-#include "scene/analysis.h"
+#include "scene/analysis/analysis.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

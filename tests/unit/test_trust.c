@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Trust: defined for degenerate clouds; planted strays lose it and vanish from pictures, and the surface beneath them is as if they were
 // not there; where no point is trusted all are drawn; the same for any threads.
-#include "scene/analysis.h"
-#include "scene/trust.h"
+#include "scene/analysis/analysis.h"
+#include "scene/analysis/trust.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"
 
@@ -68,6 +68,7 @@ static void test_levels(void **state)
     (void)state;
     for (uint32_t level = 0; level < 16; level++) {
         assert_int_equal(pt_level_of_trust(pt_trust_of_level(level)), level);
+        assert_int_equal(pt_lowest_level((double)(float)pt_trust_of_level(level)), level);
         assert_true(!level || pt_trust_of_level(level) > pt_trust_of_level(level - 1));
     }
     assert_int_equal(pt_level_of_trust(-1.0), 0);
@@ -113,14 +114,33 @@ static uint64_t shown_of(patina_device *device, const patina_cloud *cloud, float
     return shown;
 }
 
+// Something is drawn by default. Above the most trusted point all points are drawn, and the statistics report it.
 static void check_defined(const char *name, const double *position, uint64_t count)
 {
     patina_device *device = support_device_open("cpu", 0, 0);
     patina_cloud *cloud = cloud_of(position, count);
     const patina_analysis_desc desc = {.struct_size = sizeof desc};
-    free(trusts_of(cloud, &desc));
-    if (!shown_of(device, cloud, 0.0f, NULL, NULL))
+    float *trust = trusts_of(cloud, &desc), most = 0.0f;
+    uint64_t left_out[2], trusted = 0;
+    patina_cloud_info info = {.struct_size = sizeof info};
+    CHECK(patina_cloud_get_info(cloud, &info), cloud);
+    for (uint64_t i = 0; i < count; i++) {
+        most = fmaxf(most, trust[i]);
+        trusted += (double)trust[i] >= info.trust_default - 1e-4;
+    }
+    if (!shown_of(device, cloud, 0.0f, NULL, left_out))
         fail_msg("%s: nothing is drawn", name);
+    print_message("  %s: %llu of %llu points are trusted by default, the most trusted has %.3f\n", name,
+                  (unsigned long long)trusted, (unsigned long long)count, (double)most);
+    assert_int_equal(left_out[0], trusted ? info.drawn - trusted : 0);
+    assert_int_equal(left_out[1], trusted ? 0 : info.drawn);
+    const uint32_t level = pt_level_of_trust((double)most);
+    if (level < PT_TRUST_LEVELS - 1) {
+        const uint64_t all = shown_of(device, cloud, -1.0f, NULL, NULL);
+        assert_int_equal(shown_of(device, cloud, (float)pt_trust_of_level(level + 1), NULL, left_out), all);
+        assert_int_equal(left_out[1], info.drawn);
+    }
+    free(trust);
     patina_cloud_destroy(cloud);
     patina_device_destroy(device);
 }

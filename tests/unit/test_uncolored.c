@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Points without a color among colored ones: an analysis gives them the mean of their trusted colored neighbors, as a reference here
 // finds it; black surfaces stay black; once more, from a file, with new colors, in any number of threads the same.
-#include "scene/cloud.h"
-#include "scene/uncolored.h"
+#include "scene/clouds/cloud.h"
+#include "scene/analysis/uncolored.h"
 #include "base/color.h"
 #include "scenes/clouds.h"
 #include "scenes/support.h"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
 # As Final, and means of the points: a turning sphere flickers by 0.1 to 0.5 levels of 255 inside, 1.6 to 1.9 at edges.

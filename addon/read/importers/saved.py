@@ -25,5 +25,5 @@ def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
 
 
 def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
-    raise native.PatinaError(f"{path.name}: a saved cloud can only be linked, not imported", -5)
+    raise native.PatinaError(f"{path.name}: the points of a saved cloud cannot be read back. Use the file that it was made from", -5)
     yield

@@ -114,6 +114,7 @@ class Stream:
             parts.append(np.frombuffer(raw, kind, count * width, at))
             at += parts[-1].nbytes
         boxes, gaps, self._counts, parents, self._sizes = parts
+        self._coarse_first = np.argsort(-gaps, kind="stable")
         self._color = {"low": "uint8", "high": "uint8", "wide": "uint16"}.get(told["color"], "")
         self.has_scalar = bool(told["scalar"])
         self.origin, self.wkt = tuple(told["origin"]), told["wkt"]
@@ -148,6 +149,19 @@ class Stream:
                 self._asked = wanted
                 self._say({"pages": list(wanted)})
             return size
+
+    def coarsest(self, points: int) -> bool:
+        """Asks for the coarsest pages, beside what pictures want: as many as hold so many points. Whether they are there, or cannot come."""
+        with self._lock:
+            self._notice_returned()
+            reach = int(np.searchsorted(np.cumsum(self._counts[self._coarse_first], dtype=np.int64), points)) + 1
+            coming = {page for page, _ in self._tasks}
+            lacking = [page for page in self._coarse_first[:reach].tolist() if page not in self._here and page not in self._bad]
+            new = {page: None for page in lacking if page not in self._asked and page not in coming}
+            if new and not self._down:
+                self._asked = {**new, **self._asked}
+                self._say({"pages": list(self._asked)})
+            return self._down or not lacking
 
     def _size_of_wanted(self) -> int:
         """Bytes; 0 where nothing is fetched. What is there already may be given back for it."""

@@ -155,14 +155,17 @@ class FolderSource(Source):
         self._folder = os.path.dirname(path)
 
     def file(self, name: str, most: int = MOST_BYTES) -> bytes:
+        path = os.path.join(self._folder, name)
+        if os.path.exists(path) and not os.path.isfile(path):
+            raise SourceError(f"{name} is no file")  # a named pipe would wait for who writes into it
         try:
-            with open(os.path.join(self._folder, name), "rb") as file:
-                data = file.read(most + 1)
+            with open(path, "rb") as file:
+                size = os.fstat(file.fileno()).st_size
+                if size > most:
+                    raise SourceError(f"{name} is larger than {most:,} bytes")
+                return file.read(size)  # Python allocates as much as is asked for
         except OSError as error:
             raise SourceError(f"{name} cannot be read: {error.strerror}") from None
-        if len(data) > most:
-            raise SourceError(f"{name} is larger than {most:,} bytes")
-        return data
 
     def look(self, known: State | None) -> tuple[State, str, bytes | None]:
         try:

@@ -68,6 +68,15 @@ class Analyses:
             if close:
                 task.close()
 
+    def await_frames(self) -> None:
+        """On Blender's thread, where no viewport begins a picture meanwhile: waits until none is under way, for colors of clouds may
+        change then."""
+        while True:
+            with self._lock:
+                if all(task.done() for task in self._frames):
+                    return
+            time.sleep(0.002)
+
     @contextlib.contextmanager
     def drawing(self) -> Iterator[None]:
         with self._lock:
@@ -170,22 +179,23 @@ class Analyses:
             if cloud.has_shapes:
                 return
             job = self._jobs.get(cloud) or self._start(cloud, stations, 0)
-            job.claimed = True
-        took(job.progress)
+            job.claimed = True  # from now on nobody else ends it, closes its task or applies it: it is read without the lock
+        changing = False
         try:
+            took(job.progress)
             begun = time.monotonic()
             while not job.task.done():  # an eighth longer than it takes, at most: a small cloud is done in milliseconds
                 time.sleep(min(max((time.monotonic() - begun) / 8.0, 0.0005), jobs.INTERVAL))
             with self._lock:
                 self._lock.wait_for(lambda: not self._changing)
-                self._changing = True
+                self._changing = changing = True
             while not self._is_quiet():
                 time.sleep(0.002)
             job.task.result()
         finally:
             job.task.close()
             with self._lock:
-                self._changing = False
+                self._changing &= not changing  # it may be another thread's
                 self._jobs.pop(cloud, None)
                 self._lock.notify_all()
 

@@ -37,7 +37,7 @@ _ONE = {'SQRT': lambda a: np.sqrt(np.maximum(a, 0)), 'ABSOLUTE': np.abs, 'EXPONE
         'SIGN': np.sign, 'RADIANS': np.radians, 'DEGREES': np.degrees, **_ROUNDS}
 
 
-def _quotient(a: Values, b: Values) -> Values:
+def quotient(a: Values, b: Values) -> Values:
     return np.divide(a, b, out=np.zeros(np.broadcast_shapes(a.shape, b.shape), np.float32), where=b != 0)
 
 
@@ -45,25 +45,25 @@ def _power(a: Values, b: Values) -> Values:
     return np.where((a < 0) & (b != np.rint(b)), np.float32(0), exact(np.power)(a, b))
 
 
-_TWO = {'ADD': np.add, 'SUBTRACT': np.subtract, 'MULTIPLY': np.multiply, 'DIVIDE': _quotient, 'POWER': _power,
+_TWO = {'ADD': np.add, 'SUBTRACT': np.subtract, 'MULTIPLY': np.multiply, 'DIVIDE': quotient, 'POWER': _power,
         'MINIMUM': np.minimum, 'MAXIMUM': np.maximum, 'LESS_THAN': lambda a, b: (a < b) * np.float32(1),
         'GREATER_THAN': lambda a, b: (a > b) * np.float32(1), 'ARCTAN2': angle,
         'MODULO': lambda a, b: np.where(b != 0, np.fmod(a, np.where(b != 0, b, 1)), 0)}
 _BLENDS = {'MIX': lambda a, b: b, 'ADD': np.add, 'MULTIPLY': np.multiply, 'SUBTRACT': np.subtract,
-           'SCREEN': lambda a, b: 1 - (1 - a) * (1 - b), 'DIVIDE': lambda a, b: np.where(b != 0, _quotient(a, b), a),
+           'SCREEN': lambda a, b: 1 - (1 - a) * (1 - b), 'DIVIDE': lambda a, b: np.where(b != 0, quotient(a, b), a),
            'DIFFERENCE': lambda a, b: np.abs(a - b), 'DARKEN': np.minimum, 'LIGHTEN': np.maximum}
-_VECTORS = {'ADD': np.add, 'SUBTRACT': np.subtract, 'MULTIPLY': np.multiply, 'DIVIDE': _quotient, 'MINIMUM': np.minimum,
+_VECTORS = {'ADD': np.add, 'SUBTRACT': np.subtract, 'MULTIPLY': np.multiply, 'DIVIDE': quotient, 'MINIMUM': np.minimum,
             'MAXIMUM': np.maximum, 'DOT_PRODUCT': lambda a, b: (a * b).sum(1, keepdims=True), 'CROSS_PRODUCT': np.cross,
             'DISTANCE': lambda a, b: _length(a - b), 'LENGTH': lambda a, b: _length(a + 0 * b),
-            'NORMALIZE': lambda a, b: _unit(a), 'ABSOLUTE': lambda a, b: np.abs(a)}
+            'NORMALIZE': lambda a, b: unit(a), 'ABSOLUTE': lambda a, b: np.abs(a)}
 
 
 def _length(a: Values) -> Values:
     return np.sqrt((a * a).sum(1, keepdims=True))
 
 
-def _unit(a: Values) -> Values:
-    return _quotient(a, _length(a))
+def unit(a: Values) -> Values:
+    return quotient(a, _length(a))
 
 
 def _turned(a: Values, turn: np.ndarray) -> Values:
@@ -100,9 +100,10 @@ class Reader:
 
     def source(self, socket: bpy.types.NodeSocket) -> Expression | None:
         """What feeds a socket; None where nothing does, or what is not known."""
-        if not socket.is_linked or not socket.links:
+        links = [link for link in socket.links if not link.is_muted] if socket.is_linked else []
+        if not links:
             return None
-        start = socket.links[0].from_socket
+        start = links[0].from_socket
         self._depth += 1
         try:
             found = None if self._depth > 200 else self._output(start)
@@ -128,9 +129,13 @@ class Reader:
             return _as(self.value(inner[0].from_socket), inner[0].from_socket.type, socket.type) if inner else constant(0.0, 0.0, 0.0)
         read = getattr(self, "_" + node.bl_idname, None)
         found = read(node, socket) if read else None
-        if found is None and node.name not in self.unknown:
-            self.unknown.append(node.name)
+        if found is None and self._name(node) not in self.unknown:
+            self.unknown.append(self._name(node))
         return found
+
+    def _name(self, node: bpy.types.Node) -> str:
+        """How unknown lists a node."""
+        return node.name
 
     def _take(self, *values: object) -> None:
         self.key.append(values)
@@ -231,7 +236,7 @@ class Reader:
 
     def _place(self, node: bpy.types.Node) -> Expression:
         """Where a texture is asked: its vector, else the direction; turned by what the node itself has of a mapping."""
-        place = self.source(node.inputs["Vector"]) or (lambda rays: rays.directions)
+        place = self.source(node.inputs["Vector"]) or self._usual_place(node)
         mapping = node.texture_mapping
         euler, scale, move = mapping.rotation, tuple(mapping.scale), tuple(mapping.translation)
         self._take(tuple(euler), scale, move)
@@ -239,6 +244,10 @@ class Reader:
             return place
         turn = np.array(euler.to_matrix(), np.float32)
         return lambda rays: _turned(place(rays) * np.float32(scale), turn) + np.float32(move)
+
+    def _usual_place(self, _node: bpy.types.Node) -> Expression:
+        """The coordinates of a texture whose Vector is not linked."""
+        return lambda rays: rays.directions
 
     def _ShaderNodeTexEnvironment(self, node: bpy.types.Node, socket: bpy.types.NodeSocket) -> Expression | None:
         if socket.name == "Alpha":
@@ -293,9 +302,9 @@ class Reader:
         def mapped(rays: Rays) -> Values:  # a turn that differs by direction counts as that of the first
             turn = np.array(Euler(euler(rays)[0].tolist()).to_matrix(), np.float32)
             if kind == 'TEXTURE':
-                return _quotient(_turned(place(rays) - move(rays), turn.T), scale(rays))
+                return quotient(_turned(place(rays) - move(rays), turn.T), scale(rays))
             if kind == 'NORMAL':
-                return _unit(_turned(_quotient(place(rays), scale(rays)), turn))
+                return unit(_turned(quotient(place(rays), scale(rays)), turn))
             return _turned(place(rays) * scale(rays), turn) + move(rays)
 
         return mapped
@@ -313,7 +322,7 @@ class Reader:
         self._take(way)
         if socket.name == "Normal":
             return constant(*way)
-        return lambda rays: _unit(vector(rays)) @ np.array(way, np.float32)[:, None]
+        return lambda rays: unit(vector(rays)) @ np.array(way, np.float32)[:, None]
 
     def _ShaderNodeVectorMath(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression | None:
         kind = node.operation
@@ -401,7 +410,7 @@ class Reader:
         return lambda rays: np.where((c := color(rays)) > 0, exact(np.power)(np.maximum(c, 1e-30), gamma(rays)), c)
 
     def _ShaderNodeBrightContrast(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
-        color, bright, contrast = (self.value(node.inputs[name]) for name in ("Color", "Bright", "Contrast"))
+        color, bright, contrast = (self.value(one) for one in node.inputs[:3])  # by number: Bright is Brightness in some versions
         return lambda rays: np.maximum((1 + contrast(rays)) * color(rays) + bright(rays) - np.float32(0.5) * contrast(rays), 0)
 
     def _ShaderNodeInvert(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
@@ -417,8 +426,8 @@ class Reader:
 
         def changed(rays: Rays) -> Values:
             color, hue, saturation, value, share = (part(rays) for part in parts)
-            h, s, v = _hsv(color)
-            new = np.maximum(_rgb((h + hue + np.float32(0.5)) % 1, np.clip(s * saturation, 0, 1), v * value), 0)
+            h, s, v = hsv(color)
+            new = np.maximum(rgb((h + hue + np.float32(0.5)) % 1, np.clip(s * saturation, 0, 1), v * value), 0)
             return color * (1 - share) + new * share
 
         return changed
@@ -431,7 +440,7 @@ class Reader:
         self._take(clamp)
 
         def mapped(rays: Rays) -> Values:
-            t = _quotient(value(rays) - low(rays), high(rays) - low(rays))
+            t = quotient(value(rays) - low(rays), high(rays) - low(rays))
             t = np.clip(t, 0, 1) if clamp else t
             return first(rays) + t * (last(rays) - first(rays))
 
@@ -475,14 +484,14 @@ def picture_of(expression: Expression) -> Picture | None:
     return Picture(image, turn, move, np.broadcast_to(gain, (1, 3))[0], ball, closest)
 
 
-def _hsv(color: Values) -> tuple[Values, Values, Values]:
+def hsv(color: Values) -> tuple[Values, Values, Values]:
     most, least = color.max(1, keepdims=True), color.min(1, keepdims=True)
     span = most - least
     r, g, b = np.split(color, 3, axis=1)
-    hue = np.where(r == most, _quotient(g - b, span), np.where(g == most, 2 + _quotient(b - r, span), 4 + _quotient(r - g, span)))
-    return np.where(span > 0, hue / 6 % 1, 0).astype(np.float32), _quotient(span, most), most
+    hue = np.where(r == most, quotient(g - b, span), np.where(g == most, 2 + quotient(b - r, span), 4 + quotient(r - g, span)))
+    return np.where(span > 0, hue / 6 % 1, 0).astype(np.float32), quotient(span, most), most
 
 
-def _rgb(h: Values, s: Values, v: Values) -> Values:
+def rgb(h: Values, s: Values, v: Values) -> Values:
     way = np.clip(np.abs((h + np.float32([[0, 2 / 3, 1 / 3]])) % 1 * 6 - 3) - 1, 0, 1)
     return (v * (1 + s * (way - 1))).astype(np.float32)

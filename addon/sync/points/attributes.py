@@ -16,6 +16,7 @@ from ... import point_data
 NORMAL_NAMES = ("normal", "Normal", "normals", "Normals", "nor", "N")
 CLASS_NAMES = ("class", "classification", "Classification", "scalar_Classification", "scalar_classification")
 INTENSITY_NAMES = ("intensity", "reflectance", "amplitude", "grey", "gray", "scalar_intensity")  # whatever their case
+HEIGHT_NAME = "height_above_ground"
 COLOR_NAMES = ("Col", "Color", "color", "Cd", "rgb", "RGB")
 
 BLOCK = 1 << 19  # points between two looks at what the artist wants
@@ -23,7 +24,7 @@ BLOCK = 1 << 19  # points between two looks at what the artist wants
 # data_type → property of an element, components
 _LAYOUTS = {'FLOAT': ("value", 1), 'BOOLEAN': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4),
             'BYTE_COLOR': ("color_srgb", 4), 'INT': ("value", 1), 'INT8': ("value", 1), 'QUATERNION': ("value", 4),
-            'FLOAT4': ("vector", 4)}  # the last from Blender 5.2 on
+            'FLOAT2': ("vector", 2), 'FLOAT4': ("vector", 4)}  # the last from Blender 5.2 on
 _NUMBERS = {'FLOAT', 'INT', 'INT8', 'BOOLEAN'}
 # data_type → element, components, what Blender shows of one
 _BYTES = {'BYTE_COLOR': (np.uint8, 4, lambda item: np.rint(np.float32(255) * np.array(item.color_srgb, np.float32))),
@@ -188,10 +189,12 @@ def classes(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
 
 
 def missing(scene: bpy.types.Scene) -> frozenset[str]:
-    """What no cloud of a scene has: "classes", "an analysis". Empty without clouds. Linked files and modifiers may bring classes, so
-    their clouds count as classified. Reads names of attributes only."""
+    """What no cloud of a scene has: "classes", "a height above ground", "an analysis". Empty without clouds. Linked files and modifiers may
+    bring classes and heights. Reads names of attributes only."""
     clouds = [obj for obj in scene.objects if point_data.is_cloud(obj)]
-    found = {"classes": any(map(_may_have_classes, clouds)), "an analysis": any(obj.patina.analysis != 'OFF' for obj in clouds)}
+    found = {"classes": any(map(_may_have_classes, clouds)),
+             "a height above ground": any(obj.patina.linked_file or obj.modifiers or _find(obj.data, HEIGHT_NAME, _NUMBERS) for obj in clouds),
+             "an analysis": any(obj.patina.analysis != 'OFF' for obj in clouds)}
     return frozenset(name for name, there in found.items() if clouds and not there)
 
 
@@ -222,6 +225,21 @@ def weights(obj: bpy.types.Object, data: bpy.types.ID, count: int, name: str,
                 values[at] = item.weight
                 break
     return values
+
+
+def color_column(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
+    """(count, 4) of the named color attribute: uint8 sRGB, or linear float32."""
+    return colors(data, count, name) if name and _find(data, name, {'FLOAT_COLOR', 'BYTE_COLOR'}) else None
+
+
+def color_name(data: bpy.types.ID) -> str:
+    """The color attribute that counts if none is named; empty: there is none."""
+    found = next(_color_candidates(data), None)
+    return found.name if found else ""
+
+
+def have_colors(data: bpy.types.ID) -> bool:
+    return next(_color_candidates(data), None) is not None
 
 
 def _color_candidates(data: bpy.types.ID) -> Iterator[bpy.types.Attribute]:

@@ -16,7 +16,7 @@ from .. import losses
 from ..analyses import analysis, estimates
 from ..objects import images, meshes, roles
 from ..view import clips, pairs
-from . import attributes, edits, linked, ranges, soft
+from . import attributes, edits, linked, node_colors, ranges, soft
 from .built import CACHE, Pending
 from .content import attribute_names, identity_of, radius_name
 from .style import mesh_style, style_of
@@ -58,6 +58,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             link = linked.source_of(obj, depsgraph.scene_eval.frame_current if frame is None else frame, notices, analyzed)
             if link is None:
                 continue
+            if obj.patina.colors.source == 'MATERIAL':
+                notices.append(f"'{obj.name}': its file is linked, so it keeps the colors of the file. Import it to color it by a material.")
         role = roles.role_of(instance, depsgraph.view_layer_eval)
         faces_as = 0 if not solid else triangles if patina.meshes == 'TRIANGLES' else patina.mesh_points
         radius = radius_name(obj, patina.surface)
@@ -81,6 +83,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIGHTING["LIT"])
+            elif obj.patina.lighting == 'AUTO' and node_colors.used(obj):
+                style = replace(style, lighting=LIGHTING["UNLIT" if node_colors.is_emission(obj) else "LIT"])
             edited = edits.state_of(obj)
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
             told = ranges.told_of(obj, patina.surface)
@@ -96,10 +100,10 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     images.CACHE.trim()
     notices += filter(None, [edits.notice(item.name, item.edits, item.cloud) for item in items
                              if isinstance(item, CloudItem) and item.edits and isinstance(item.cloud, native.Cloud)])
-    notices += [f"'{item.name}' has no {missing} to be soft by" for item in items if isinstance(item, CloudItem) and item.soft and
+    notices += [f"'{item.name}' has no {missing} to be {'hidden' if item.soft.hides else 'soft'} by" for item in items if isinstance(item, CloudItem) and item.soft and
                 isinstance(item.cloud, native.Cloud) and (missing := item.soft.missing(item.cloud))]
-    estimates.keep({name: built.layer_distance * scale for name, scale, cloud in scales
-                    if (built := cloud.built if isinstance(cloud, Pending) else cloud)})
+    told = [(name, scale, built) for name, scale, cloud in scales if (built := cloud.built if isinstance(cloud, Pending) else cloud)]
+    estimates.keep({name: built.layer_distance * scale for name, scale, built in told}, {name: built.spacing * scale for name, scale, built in told})
     notices += unknown.notices()
     if not items:
         notices.append(losses.Loss("no visible object has points to draw"))

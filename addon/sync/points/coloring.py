@@ -11,11 +11,11 @@ import numpy as np
 
 from ... import jobs, point_data
 from ..analyses.scans_of import SCAN_NAMES
-from . import attributes, linked
+from . import attributes, linked, node_colors
 
 SHARE = 0.01  # of the points that a range leaves out at either end
 _NUMBERS = {'FLOAT', 'INT', 'INT8', 'BOOLEAN'}
-_LAS = {".las", ".laz"}  # files whose points always have an intensity and a class
+LAS = {".las", ".laz"}  # files whose points always have an intensity and a class
 # label, names of attributes in any case, ramp
 _KNOWN = (
     ("Intensity", attributes.INTENSITY_NAMES, 'GREY'),
@@ -50,6 +50,8 @@ def choices(obj: bpy.types.Object) -> list[Choice]:
     normal = "" if obj.patina.linked_file else _normal_name(obj)
     if normal:
         found.append(Choice("Normal", 'OWN', normal))
+    if not obj.patina.linked_file and any(map(node_colors.is_linked, node_colors.materials_of(obj))):
+        found.append(Choice("Material", 'MATERIAL'))
     return found + [Choice("Height", 'HEIGHT', ramp='RELIEF'), Choice("Local Height", 'OBJECT_HEIGHT', ramp='RELIEF'),
                     Choice("Distance from Camera", 'DISTANCE', ramp='VIRIDIS'), Choice("Trust", 'TRUST', ramp='VIRIDIS')]
 
@@ -59,6 +61,8 @@ def current(obj: bpy.types.Object) -> str:
     group = obj.patina.colors
     if group.source == 'SCALAR':
         return _label(group.scalar)[0] if group.scalar else "Attribute"
+    if group.source == 'MATERIAL' or node_colors.used(obj):
+        return "Material"
     if group.source == 'OWN':
         return "Normal" if obj.patina.color_attribute in attributes.NORMAL_NAMES else "Color"
     return next(choice.label for choice in choices(obj) if choice.source == group.source)
@@ -80,7 +84,7 @@ def apply(obj: bpy.types.Object, choice: Choice, frame: int) -> bool:
     if choice.source == 'SCALAR' and patina.lighting == 'AUTO':
         patina.lighting = 'UNLIT'  # values can be told apart
     group.use_range = False
-    if choice.source in {'FIXED', 'DISTANCE', 'TRUST'} or group.ramp == 'CLASSES' and choice.source == 'SCALAR':
+    if choice.source in {'FIXED', 'DISTANCE', 'TRUST', 'MATERIAL'} or group.ramp == 'CLASSES' and choice.source == 'SCALAR':
         return True
     found = value_range(obj, SHARE, frame)
     if found is None:
@@ -137,7 +141,7 @@ def _label(name: str) -> tuple[str, str, int]:
 
 def _scalars(obj: bpy.types.Object) -> list[Choice]:
     if obj.patina.linked_file:
-        names = ["intensity", "class"] if Path(obj.patina.linked_file).suffix.lower() in _LAS else []
+        names = ["intensity", "class"] if Path(obj.patina.linked_file).suffix.lower() in LAS else []
         if obj.patina.colors.scalar and obj.patina.colors.scalar not in names:
             names.append(obj.patina.colors.scalar)
     else:

@@ -23,7 +23,7 @@ UNCLASSIFIED = 1 << 0 | 1 << 1  # bits of the classes: never classified, unassig
 def style_fields(obj: bpy.types.Object) -> dict[str, Any]:
     group = obj.patina.colors
     return {
-        "color_source": enum_number(group, "source"),
+        "color_source": OWN if group.source == 'MATERIAL' else enum_number(group, "source"),
         "ramp": _ramp(group),
         "ramp_range": _range(group),
         "exposure": group.exposure,
@@ -41,7 +41,7 @@ def scalar_name(obj: bpy.types.Object) -> str:
 
 def _ramp(group: bpy.types.PropertyGroup) -> bytes:
     """Linear RGB, float32. A custom ramp that is not there is grey."""
-    if group.source in {'OWN', 'FIXED'}:
+    if group.source in {'OWN', 'FIXED', 'MATERIAL'}:
         return b""
     if group.ramp != 'CUSTOM':
         return native.ramp(group.ramp.lower()).tobytes()

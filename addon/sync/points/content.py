@@ -14,7 +14,7 @@ from ...jobs import Steps
 from ..analyses import analysis
 from ..analyses.scans_of import SCAN_NAMES, Scans, scans_in
 from ..objects import meshes
-from . import attributes, colors, soft, splats
+from . import attributes, colors, node_colors, soft, splats
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,10 @@ def identity_of(obj: bpy.types.Object, used: set[tuple], radius: str, faces_as: 
     return (radius, *base, number, faces_as)
 
 
-def attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
+def attribute_names(obj: bpy.types.Object) -> tuple[str | bool | tuple, ...]:
     return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute, colors.scalar_name(obj),
-            obj.patina.colors.class_attribute, obj.patina.radius_attribute, obj.patina.hide_uncolored, soft.attribute_name(obj))
+            obj.patina.colors.class_attribute, obj.patina.radius_attribute, obj.patina.hide_uncolored, soft.attribute_name(obj),
+            *node_colors.identity(obj))
 
 
 def radius_name(obj: bpy.types.Object, surface: str) -> str:
@@ -126,6 +127,9 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
         notices.append(f"'{obj.name}' has no point attribute '{softened}' to be soft by")
     if obj.patina.hide_uncolored:
         opacities, rgb = attributes.without_uncolored(opacities, rgb)
+    if node_colors.used(obj):
+        rgb, shown = node_colors.read(obj, data, positions, normals, notices, pause)
+        opacities = opacities if shown is None else shown if opacities is None else opacities * shown
     analyzed = analysis.wanted(obj)
     stations = analysis.stations(obj, data, count, analyzed == 2) if analyzed else None
     if analyzed == 2 and not (stations and stations.by_grid):

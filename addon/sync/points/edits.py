@@ -15,7 +15,7 @@ import threading
 import weakref
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -27,6 +27,7 @@ from ... import native
 from ...description.points import EditState, Scan
 from ...native import points
 from ...native.points import Field, Grade, Mask
+from . import node_colors
 
 PROPERTY = "patina_points"  # of an object
 PLANES = ("selected", "hidden", "deleted")
@@ -119,8 +120,8 @@ def state_of(obj: bpy.types.Object) -> EditState:
     grades = tuple((number_of(item), graded) for item in group.scans if (graded := grade_of_item(item)) != NEUTRAL)
     solo = any(item.solo for item in group.scans)
     hidden = tuple(number_of(item) for item in group.scans if item.hide or solo and not item.solo)
-    balanced = group.use_balance and obj.patina.colors.source == 'OWN'
-    return EditState(packed_of(obj) if obj.patina.linked_file else "", grades, hidden, balanced, not group.use_lent_colors)
+    balanced = group.use_balance and obj.patina.colors.source == 'OWN' and not node_colors.used(obj)
+    return EditState(packed_of(obj) if obj.patina.linked_file else "", grades, hidden, balanced, not group.use_lent_colors or node_colors.used(obj))
 
 
 def number_of(item: bpy.types.PropertyGroup) -> int:
@@ -203,31 +204,42 @@ def mask_of(cloud: native.Cloud, state: EditState) -> Mask | None:
     """Any thread."""
     if cloud.stream:  # a notice has said so
         return None
-    try:
-        found = for_cloud(state.packed, cloud.count)
-    except Damaged:
-        found = None
-    places = [place for place, number in enumerate(cloud.scan_numbers) if number in state.hidden]
-    scans = scans_of(cloud) if places else None
+    found = _readable(state, cloud.count)
+    scans = scans_of(cloud) if any(number in state.hidden for number in cloud.scan_numbers) else None
     everything = ALL in state.hidden and not cloud.scan_numbers
     if not found and scans is None and not everything:
         return None
 
     def make() -> Mask:
-        gone = found.gone if found else None
-        if everything or scans is not None:
-            bits = every(cloud.count) if everything else of_flags(np.isin(np.arange(len(cloud.scan_numbers)), places)[scans])
-            gone = bits if gone is None else gone | bits
-        return Mask(cloud, gone, found.selected if found else None)
+        return Mask(cloud, gone_of(state, cloud.count, cloud.scan_numbers, scans), found.selected if found else None)
 
     return keep(cloud, ("mask", state.packed, state.hidden, cloud.scan_stamp), make)
 
 
-def has_selection(cloud: native.Cloud, state: EditState) -> bool:
+def _readable(state: EditState, count: int) -> Edits | None:
+    """None if there are none, or if they are damaged."""
     try:
-        found = for_cloud(state.packed, cloud.count)
+        return for_cloud(state.packed, count)
     except Damaged:
-        return False
+        return None
+
+
+def gone_of(state: EditState, count: int, numbers: Sequence[int], scans: np.ndarray | None) -> Bits | None:
+    """The points of a cloud that are hidden or deleted; None: none. numbers: of its scans. scans: (count,) which of these each point is
+    of, or None."""
+    found = _readable(state, count)
+    gone = found.gone if found else None
+    hidden = [number in state.hidden for number in numbers]
+    if ALL in state.hidden and not numbers:
+        return every(count)
+    if any(hidden) and scans is not None:
+        bits = of_flags(np.array(hidden)[scans])
+        gone = bits if gone is None else gone | bits
+    return gone
+
+
+def has_selection(cloud: native.Cloud, state: EditState) -> bool:
+    found = _readable(state, cloud.count)
     return found is not None and found.totals["selected"] > 0
 
 

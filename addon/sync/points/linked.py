@@ -285,6 +285,14 @@ def _open_saved(source: Source) -> Linked:
     return Linked(cloud, origin, cloud.box, [])
 
 
+def saved_cloud(source: Source) -> tuple[Path, Corner] | None:
+    """The file of a cloud that is there already, and the offset of its positions to the object's. None: there is none yet, or its points
+    are read as needed."""
+    if source.streamed or not source.kept.is_file():
+        return None
+    return source.kept, tuple(-value for value in source.origin or ZERO) if source.is_saved else ZERO
+
+
 def _opened(source: Source) -> Linked | None:
     """The kept cloud; None where it is not there yet, of another version, or damaged: it is made anew then."""
     try:

@@ -88,6 +88,27 @@ def shared_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
     return np.array(obj.get(SHARED, scene.get(PROPERTY, ZERO)), np.float64)
 
 
+def to_file(obj: bpy.types.Object, scene: bpy.types.Scene) -> tuple[np.ndarray, np.ndarray]:
+    """(3, 3) and (3,): an evaluated object's coordinates → those of the file that it came from, or of the world."""
+    shared = shared_of(obj.original, scene)
+    inverse = np.linalg.inv(axes_of(obj.original))
+    own = np.array(obj.original.get(PROPERTY, inverse @ shared), np.float64)
+    matrix = np.array(obj.matrix_world, np.float64)
+    turn, place = inverse @ matrix[:3, :3], matrix[:3, 3]
+    # an object that still lies where its import put it goes back to its file's coordinates to the last bit
+    home = axes_of(obj.original) @ own - shared
+    at_place = np.allclose(place, home, rtol=0, atol=1e-3 + 1e-6 * np.abs(home).max())
+    if at_place and np.allclose(turn, np.eye(3), rtol=0, atol=1e-6):
+        turn = np.eye(3)
+    together = any(shared) or SHARED in obj.original
+    return turn, own if at_place else inverse @ (shared + place) if together else own + inverse @ place
+
+
+def zero_of(scene: bpy.types.Scene) -> np.ndarray:
+    """(3,) the place of the world, in metres, that Blender's zero is to most objects of the scene."""
+    return np.array(next(iter(_known(scene)), scene.get(PROPERTY, ZERO)), np.float64)
+
+
 def _moved(origin: Sequence[float], turn: np.ndarray | None) -> Origin:
     return tuple(float(value) for value in (origin if turn is None else turn @ np.array(origin, np.float64)))
 

@@ -40,6 +40,8 @@ def soft_of(obj: bpy.types.Object, matrix: Matrix, scene: bpy.types.Scene) -> So
     }
     if group.by == 'ALL':
         return Soft(group.by, "", tuple(style.items()))
+    if group.hide:
+        style["soft"] = SOFT["HIDDEN"]
     style["soft_threshold"] = group.threshold
     desc: dict[str, Any] = {"source": enum_number(group, "by")}
     if group.by == 'CLASSES':

@@ -14,7 +14,7 @@ from ...read.importers import Progress
 from ..analyses import analysis
 from ..analyses.analyzing import ANALYSES
 from ..objects import images, meshes
-from . import linked
+from . import linked, node_colors
 from .built import CACHE, Pending, PendingLink
 from .content import PointArrays, identity_of, radius_name, read
 
@@ -162,7 +162,7 @@ class Trusted:
 
         def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None, analyzed: bool) -> Pending | meshes.Faces | None:
             owners = {item: None for item in (obj, obj.data, *(slot.material for slot in obj.material_slots),
-                                              *getattr(obj.data, "materials", ())) if item}  # each once
+                                              *getattr(obj.data, "materials", ()), *node_colors.images_of(obj)) if item}  # each once
             key = (*identity, tuple((_kind(owner), owner.original.name_full) for owner in owners))
             self._used.add(key)
             if key not in self._known:
@@ -177,7 +177,7 @@ class Trusted:
                     arrays = read(obj, said, identity[0], identity[-1])
                     self._known[key] = (Pending(obj.name, identity, arrays) if arrays else None, said)
             pending, said = self._known[key]
-            notices.extend(said)
+            notices.extend(text for text in said if text not in notices)  # materials are shared
             return pending
 
         return take
@@ -199,6 +199,7 @@ def changed_owners(depsgraph: bpy.types.Depsgraph) -> set[tuple[str, str]]:
                 owners.add((_kind(item), item.name_full))
         elif isinstance(item, bpy.types.Image):
             images.CACHE.forget({item.name_full})
+            owners.add((_kind(item), item.name_full))
         elif update.is_updated_geometry or isinstance(item, (bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Material)):
             owners.add((_kind(item), item.name_full))
     return owners

@@ -9,17 +9,16 @@ import bpy
 
 from ...description.settings import Effects, off
 from ...description.view import Focus
-from ...native.abi import EFFECTS
+from ...native.abi import EFFECTS, OWN_EFFECTS
 from ...properties import enum_number
 
 
 def read(scene: bpy.types.Scene, focus: Focus | None, notices: list[str]) -> Effects:
     effects = scene.patina.effects
-    values: dict[str, Any] = {}
-    for effect in EFFECTS:
-        shown = effect["panel"] != "CAMERA"
-        values |= {field["name"]: _value(effects, field) if shown else 0 for field in effect["fields"]}
-        if shown and not getattr(effects, f"use_{effect['name']}"):
+    values: dict[str, Any] = {field["name"]: 0 for effect in EFFECTS for field in effect["fields"]}
+    for effect in OWN_EFFECTS:
+        values |= {field["name"]: _value(effects, field) for field in effect["fields"]}
+        if not getattr(effects, f"use_{effect['name']}"):
             values |= off(effect)
     if values["fog_density"] and values["fog_end"] <= values["fog_start"]:
         notices.append("fog is left out: its end is not beyond its start")

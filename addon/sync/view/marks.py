@@ -5,15 +5,18 @@ from __future__ import annotations
 
 import math
 import weakref
+from dataclasses import asdict
 
 import bpy
 import numpy as np
 
 from ... import native, point_data
-from ...description.marks import Bar, Legend, Marks
+from ...description.marks import Bar, Legend, Marks, Strokes
 from ...description.points import CloudItem
 from ...description.view import View
+from ...native.abi import COLOR_SOURCE
 from ...properties.colors import class_name
+from .. import measures
 from ..points import attributes, coloring
 
 BAR = 0.22  # of the image's width: the longest bar
@@ -22,17 +25,18 @@ LEAST_NORTH = 0.1  # of its length: how much of the direction to the north must 
 # meters, name, by the scene's system of units
 _UNITS = {'METRIC': ((1000.0, "km"), (1.0, "m"), (0.01, "cm"), (0.001, "mm")), 'IMPERIAL': ((1609.344, "mi"), (0.3048, "ft"), (0.0254, "in"))}
 _LENGTHS = {"Height Above Ground", "Spacing", "Thickness", "Distance to Other"}  # attributes in the object's units
+_spans: weakref.WeakKeyDictionary[native.Cloud, tuple[tuple, tuple[float, float]]] = weakref.WeakKeyDictionary()
 _classes: weakref.WeakKeyDictionary[native.Cloud, tuple[int, ...]] = weakref.WeakKeyDictionary()
 
 
-def read(scene: bpy.types.Scene, view: View, items: list[CloudItem]) -> Marks | None:
-    """None: nothing is written. Main thread, or that of a final render."""
+def read(scene: bpy.types.Scene, view: View, items: list[CloudItem], layer: bpy.types.ViewLayer | None = None) -> Marks | None:
+    """None: nothing is written. Main thread, or that of a final render. layer: whose measurements are written; None: none."""
     group = scene.patina.marks
     titles = tuple(filter(None, (group.title or scene.name, group.note))) if group.use_title else ()
-    marks = Marks(tuple(filter(None, (_legend(scene, item) for item in items))),
+    marks = Marks(tuple(filter(None, (_legend(scene, item, view) for item in items))),
                   _bar(scene, view) if group.use_bar else None, _north(group.north, view) if group.use_north else None,
-                  titles, group.size, group.burn)
-    return marks if marks.legends or marks.bar or marks.north is not None or marks.titles else None
+                  titles, group.size, group.burn, _strokes(scene, view, layer) if layer and group.use_measures else None)
+    return marks if marks.legends or marks.bar or marks.north is not None or marks.titles or marks.strokes else None
 
 
 def round_step(value: float) -> float:
@@ -86,7 +90,34 @@ def _north(turn: float, view: View) -> float | None:
     return math.atan2(y, x) if math.hypot(x, y) > LEAST_NORTH else None
 
 
-def _legend(scene: bpy.types.Scene, item: CloudItem) -> Legend | None:
+def _strokes(scene: bpy.types.Scene, view: View, layer: bpy.types.ViewLayer) -> Strokes | None:
+    """None: there are none, or a panorama is drawn."""
+    found = [] if view.panorama else list(measures.shown(layer))
+    figures = [measures.figure(one, scene) for one in found]
+    segments = [_on_image(view, np.stack(pair)) for figure in figures for line in figure.lines for pair in zip(line, line[1:], strict=False)]
+    dots = [_on_image(view, np.stack([place, place])) for one in found for place in one.points]
+    labels = [(_on_image(view, np.stack([place, place])), text) for figure in figures for place, text in figure.labels]
+    return Strokes(tuple(filter(None, segments)), tuple(dot[:2] for dot in dots if dot), tuple((*at[:2], text) for at, text in labels if at)) \
+        if found else None
+
+
+def _on_image(view: View, ends: np.ndarray) -> tuple[float, float, float, float] | None:
+    """Pixels of a segment's ends in the part of the image that is drawn, as far as it lies beyond the near clip. None: nowhere."""
+    camera = view.camera
+    local = (np.column_stack([ends, np.ones(2)]) @ np.linalg.inv(np.array(camera.world_from_camera).reshape(4, 4)).T)[:, :3]
+    depths = -local[:, 2] - camera.near_clip
+    if depths.max() <= 0.0:
+        return None
+    if depths.min() < 0.0:
+        behind = int(np.argmin(depths))
+        local[behind] += (local[1 - behind] - local[behind]) * (-depths[behind] / (depths[1 - behind] - depths[behind]))
+    over = np.ones(2) if camera.orthographic else -local[:, 2]
+    x = (local[:, 0] / over - camera.left) / (camera.right - camera.left) * view.width - view.region[0]
+    y = (local[:, 1] / over - camera.bottom) / (camera.top - camera.bottom) * view.height - view.region[1]
+    return float(x[0]), float(y[0]), float(x[1]), float(y[1])
+
+
+def _legend(scene: bpy.types.Scene, item: CloudItem, view: View) -> Legend | None:
     obj = bpy.data.objects.get(item.name)
     if obj is None or not obj.patina.colors.use_legend or not item.style.ramp:
         return None
@@ -95,12 +126,8 @@ def _legend(scene: bpy.types.Scene, item: CloudItem) -> Legend | None:
     if group.source == 'SCALAR' and group.ramp == 'CLASSES':
         found = _swatches(obj, cloud)
         return Legend(label, swatches=found) if found else None
-    low, high = style.ramp_range
-    if low == high and group.source == 'TRUST':
-        low, high = 0.0, 1.0
-    if low == high and group.source == 'SCALAR' and cloud and cloud.has_scalars:
-        low, high = cloud.scalar_range(0.0)
-    if low == high:  # only the library knows the ends
+    low, high = style.ramp_range if style.ramp_range[0] != style.ramp_range[1] else _automatic(item, cloud, view)
+    if not low < high and not high < low:  # one value, or the cloud is not there yet
         return Legend(label, style.ramp, ((0.0, "lowest"), (1.0, "highest")))
     factor, unit = 1.0, ""
     if group.source in {'HEIGHT', 'DISTANCE'}:
@@ -111,6 +138,27 @@ def _legend(scene: bpy.types.Scene, item: CloudItem) -> Legend | None:
         factor *= size
     shown = tuple(((value / factor - low) / (high - low), text) for value, text in ticks(low * factor, high * factor))
     return Legend(f"{label} ({unit})" if unit else label, style.ramp, shown)
+
+
+def _automatic(item: CloudItem, cloud: native.Cloud | None, view: View) -> tuple[float, float]:
+    """The ends of a ramp without a range of its own, as the library takes them for images. 0, 0: they are not known."""
+    style = item.style
+    if cloud is None or view.panorama and style.color_source == COLOR_SOURCE["DISTANCE"] or \
+            style.color_source == COLOR_SOURCE["SCALAR"] and not cloud.has_scalars:
+        return 0.0, 0.0
+    key = (style.color_source, style.world_from_object, view.camera if style.color_source == COLOR_SOURCE["DISTANCE"] else None)
+    known = _spans.get(cloud)
+    if known is None or known[0] != key:
+        try:
+            with native.Scene() as scene:
+                scene.add_cloud(cloud, color_source=style.color_source, world_from_object=style.world_from_object)
+                scene.set_camera(**asdict(view.camera))
+                known = key, scene.ramp_range(0)
+        except native.PatinaError:  # it has no points
+            known = key, (0.0, 0.0)
+        if style.color_source != COLOR_SOURCE["SCALAR"]:  # scalars are exchanged under the same cloud
+            _spans[cloud] = known
+    return known[1]
 
 
 def _swatches(obj: bpy.types.Object, cloud: native.Cloud | None) -> tuple[tuple[tuple[float, float, float], str], ...]:

@@ -290,7 +290,7 @@ static void tail_rows(void *context, uint32_t begin, uint32_t end, uint32_t thre
         walk->first = first;
         y = first - 4 - 2 * ahead;
     }
-    for (; y < last; y++) { // y is finished when y + 2 + ahead has been seen
+    for (; y < last && !pt_cpu_cancelled(&tail->passes[0].call); y++) { // y is finished when y + 2 + ahead has been seen
         see(tail, walk, y + 2 + ahead);
         find_flat(tail, walk, y + 1 + ahead);
         if (y + 2 + lag >= walk->first - 2 - lag)
@@ -465,5 +465,5 @@ int PT_KERNEL_ENTRY(tail)(const struct pt_cpu_pass *passes, uint32_t count)
     }
     if (tail.end > tail.base)
         pt_parallel(shared->pool, (uint32_t)(tail.end - tail.base + UNIT - 1) / UNIT, 1, tail_rows, &tail);
-    return PATINA_OK;
+    return pt_cpu_cancelled(shared) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

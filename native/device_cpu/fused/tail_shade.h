@@ -269,7 +269,7 @@ static void darken(const struct tail *tail, struct walk *walk, const struct pt_c
     if (walk->edl_next < y - reach || walk->edl_next > end)
         walk->edl_next = y - reach;
     for (; walk->edl_next < end; walk->edl_next++)
-        pt_edl_load_row(&args->view, tail->planes.keys, walk->edl_next, pt_edl_row(ring, walk->edl_next));
+        pt_edl_load_row(args, tail->planes.keys, walk->edl_next, pt_edl_row(ring, walk->edl_next));
     pt_edl_near(args, ring, y, near);
     for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
         vf depth = vf_load(own + x);

@@ -45,9 +45,9 @@ static void edl_bands(void *context, uint32_t begin, uint32_t end, uint32_t thre
         int32_t first = (int32_t)(rect[1] + band * BAND_ROWS);
         int32_t last = first + BAND_ROWS < (int32_t)rect[3] ? first + BAND_ROWS : (int32_t)rect[3];
         for (int32_t y = first - reach; y < first + reach; y++)
-            pt_edl_load_row(&args->view, keys, y, pt_edl_row(&ring, y));
+            pt_edl_load_row(args, keys, y, pt_edl_row(&ring, y));
         for (int32_t y = first; y < last; y++) {
-            pt_edl_load_row(&args->view, keys, y + reach, pt_edl_row(&ring, y + reach));
+            pt_edl_load_row(args, keys, y + reach, pt_edl_row(&ring, y + reach));
             edl_row(edl, &ring, (uint32_t)y);
         }
     }

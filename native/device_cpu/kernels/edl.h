@@ -23,9 +23,23 @@ struct pt_edl_planes {
 
 static inline size_t pt_edl_stride(uint32_t width) { return ((size_t)width + 15) / 16 * 16 + 2 * PT_EDL_PAD; }
 
-// Row y of the plane.
-static inline void pt_edl_load_row(const struct view_args *view, const uint64_t *keys, int32_t y, float *row)
+// f(z) of PT_LANES pixels from (x, y) on; z is above 0 in perspective views.
+static inline vf pt_edl_depth(const struct edl_args *args, vf z, uint32_t x, uint32_t y)
 {
+    if (!args->view.perspective)
+        return z;
+    const vf depth = vf_log2(z);
+    if (!args->from_eye)
+        return depth;
+    vf ray[2];
+    vf_ray(&args->view, x, y, ray);
+    return depth + vf_set(0.5f) * vf_log2((ray[0] * ray[0] + ray[1] * ray[1]) + vf_set(1.0f));
+}
+
+// Row y of the plane.
+static inline void pt_edl_load_row(const struct edl_args *args, const uint64_t *keys, int32_t y, float *row)
+{
+    const struct view_args *view = &args->view;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), beyond = vf_set(PT_EDL_BEYOND);
     const uint32_t inside = y < 0 || y >= (int32_t)view->height ? 0 : view->width;
     keys += (ptrdiff_t)y * view->width;
@@ -36,7 +50,7 @@ static inline void pt_edl_load_row(const struct view_args *view, const uint64_t 
         vm some = vf_lt(z, empty);
         vf depth = vf_set(PT_EDL_EMPTY);
         if (vm_bits(some))
-            depth = vf_select(some, view->perspective ? vf_log2(vf_select(some, z, vf_set(1.0f))) : z, depth);
+            depth = vf_select(some, pt_edl_depth(args, vf_select(some, z, vf_set(1.0f)), x, (uint32_t)y), depth);
         vf_store(row + x, depth);
     }
     for (uint32_t x = inside; x < view->width + PT_EDL_PAD; x++)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #ifndef __khrplatform_h_
 #define __khrplatform_h_
 

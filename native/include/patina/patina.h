@@ -55,8 +55,11 @@ extern "C" {
 #define PATINA_API __attribute__((visibility("default")))
 #endif
 
-#define PATINA_VERSION_MAJOR 0
-#define PATINA_VERSION_MINOR 1
+// The version of Patina. build/version.py reads it here, compares all other places with it, and writes a new one to all of them.
+// Before 1.0.0 a program needs a library of the same minor version. From then on it needs the same major version, and at least its own
+// minor version.
+#define PATINA_VERSION_MAJOR 1
+#define PATINA_VERSION_MINOR 0
 #define PATINA_VERSION_PATCH 0
 
 // One list of errors. X(name, code, sentence)
@@ -70,7 +73,8 @@ extern "C" {
     X(ERROR_CANCELLED, -7, "cancelled")                                                                                        \
     X(ERROR_TOO_MANY_POINTS, -8, "too many points for one cloud or picture")                                                   \
     X(ERROR_EMPTY, -9, "there is nothing to read")                                                                             \
-    X(ERROR_INTERNAL, -10, "internal error")
+    X(ERROR_INTERNAL, -10, "internal error")                                                                                   \
+    X(ERROR_TOO_LARGE, -11, "the image is too large for the memory or the device: render it in smaller regions")
 
 enum patina_error {
     PATINA_OK = 0,
@@ -95,8 +99,11 @@ typedef struct patina_task patina_task;
 
 // ---- errors, log, version -------------------------------------------------------------------------------------
 
-// Library version as "0.1.0+1a2b3c4d5e6f", the last a sum of the sources; static storage.
+// Library version as MAJOR.MINOR.PATCH+1a2b3c4d5e6f, the last a sum of the sources; static storage.
 PATINA_API const char *patina_version(void);
+// Size in bytes of one of this interface's structures in the library, by its name: "patina_camera". 0: the library has none of that
+// name, or name is NULL. A size smaller than the caller's: the library is older than the caller's header.
+PATINA_API size_t patina_struct_size(const char *name);
 // The general sentence of a code; static storage, never NULL.
 PATINA_API const char *patina_error_text(int code);
 // Copies the last message of a handle (any kind), or of the calling thread when handle is NULL, as UTF-8 into
@@ -231,6 +238,13 @@ PATINA_API int patina_cloud_scalar_range(const patina_cloud *cloud, double share
 // The box of a cloud without strays: points outside of the box of 90 percent of them that have hardly another near. Of a
 // cloud without any its own box; an empty cloud has min > max.
 PATINA_API int patina_cloud_dense_box(const patina_cloud *cloud, double box_min[3], double box_max[3]);
+// At most `room` of the drawn points, evenly chosen, for previews: all of them if there are no more. Of a saved cloud (patina_cloud_open) it
+// reads the first strata of each chunk, little else. hidden: leaves points out, as in patina_mask_create, of `size` bytes; NULL and 0: none.
+// Then it writes about `room` of the others. positions: 3 * room, object units. colors: 3 * room, linear; normals: 3 * room, unit, 0
+// where a point has none; scalars: room. Each of these three may be NULL, and stays as it is if the cloud has none. *count: how many were
+// written. Of a cloud in pages: of those that arrived, and PATINA_ERROR_UNSUPPORTED for hidden ones while some are on their way.
+PATINA_API int patina_cloud_thin(const patina_cloud *cloud, const uint8_t *hidden, size_t size, uint64_t room, float *positions,
+                                 float *colors, float *normals, float *scalars, uint64_t *count);
 // What every point knows (SPEC 11), from its nearest neighbours among all points: normal, spacing, footprint, thickness, kind.
 enum patina_kind {
     PATINA_KIND_UNKNOWN = 0, // not analysed, alone, or all neighbours at its own place
@@ -244,7 +258,7 @@ enum patina_kind {
 // Where nothing tells the side of a surface, 64 views from outside vote for the one that is seen; sheets face up.
 #define PATINA_SIDES_VOTED 2
 
-// Numbers of patina_analysis_desc.trust_features: scene/trust_features.h lists them.
+// Numbers of patina_analysis_desc.trust_features: scene/analysis/trust_features.h lists them.
 #define PATINA_TRUST_FEATURES 33
 // By default points of less trust are not drawn: at most 1 % of the right samples of any scene for tuning have less. Where 0.05 % of a cloud's
 // points have less, its default is raised, to PATINA_TRUST_MOST at most, while at most 1 % of those that are probably right have less.
@@ -354,8 +368,9 @@ enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, 
 // What points are. ALL: every one is a ball of density, drawn in the order of depth with those of all soft clouds, over what is opaque
 // and behind it, hidden by what is opaque before it. Keys, depth, picks, lines and other passes tell of the rest of the scene. Soft
 // points take shadows, and cast them as dark as what they let through up to each point. FIELD: so are points whose field is above
-// soft_threshold; the others are as with OFF.
-enum patina_soft { PATINA_SOFT_OFF = 0, PATINA_SOFT_ALL = 1, PATINA_SOFT_FIELD = 2 };
+// soft_threshold; the others are as with OFF. HIDDEN: points whose field is above soft_threshold are not drawn and cast no shadow; the others
+// are as with OFF.
+enum patina_soft { PATINA_SOFT_OFF = 0, PATINA_SOFT_ALL = 1, PATINA_SOFT_FIELD = 2, PATINA_SOFT_HIDDEN = 3 };
 // BASE: the density along the ray, exactly, through balls that intersect. CONCENTRIC: by shells of even density, which come to BASE as
 // they grow many. EXPRESS: a disc a ball, ten times faster. For comparison, as in the paper: SPLATS: the nearest discs alone, opaque;
 // ONE_LAYER: the same, with their opacities: nothing of what is soft behind them shows. Both cast and take shadows as EXPRESS.
@@ -417,8 +432,8 @@ typedef struct patina_cloud_style {
                            // so that single points show (1); 1 - W of [S Eq. 22].
                            // FIELD: l_m - t of it: such a share of the field's range above the threshold leads from that
                            // opacity to the model's own; 0 = none of it
-    const patina_field *field; // of this cloud, for FIELD. It must outlive what the mask must
-    float soft_threshold;      // FIELD: 0..1; points with more are soft
+    const patina_field *field; // of this cloud, for FIELD and HIDDEN. It must outlive what the mask must
+    float soft_threshold;      // FIELD, HIDDEN: 0..1; points with more are soft, or hidden
     float soft_unused;         // says nothing
     // Of points as range images [Kawata & Kanai], SPEC 6; nothing for others:
     const patina_scans *scans; // of this cloud: the scans that it was made of. NULL = one. It must outlive what the mask must
@@ -484,6 +499,10 @@ typedef struct patina_camera {
     double world_from_camera[16];    // columns are normalised; a scaled camera is allowed
     double left, right, bottom, top; // window at distance 1 (perspective) or in world units (orthographic)
     double near_clip, far_clip;      // distances along the view; orthographic near may be negative
+    uint32_t
+        panorama_face; // 1 = a face of a panorama, as patina_panorama_camera sets it: eye-dome lighting compares distances from the
+                       // eye in place of depths along the view, so that the cube's edges do not show
+    uint32_t camera_unused; // says nothing
 } patina_camera;
 
 enum patina_quality { PATINA_QUALITY_REFINED = 0, PATINA_QUALITY_PAPER = 1 }; // filled depth: tangent plane | source's
@@ -636,6 +655,9 @@ PATINA_API int patina_scene_set_lines(patina_scene *scene, const patina_lines *l
 // meshes. Near and far planes that hold this box cut nothing. Set the settings first: they decide what is drawn as discs. An empty scene has
 // min > max.
 PATINA_API int patina_scene_extent(const patina_scene *scene, double box_min[3], double box_max[3]);
+// The values at the two ends of an instance's ramp, as images of the scene take them: of the style's ramp_range, or what stands for it
+// where that is automatic. Automatic distances need the camera. PATINA_ERROR_EMPTY for a cloud without points. Any thread.
+PATINA_API int patina_scene_ramp_range(const patina_scene *scene, uint32_t instance, double range[2]);
 // A camera that frames the scene's clouds, as far as clips leave them and without strays (patina_cloud_dense_box), seen from
 // `azimuth` degrees around z (0 = from -y) and `elevation` degrees above the horizon, vertical field of view fov_degrees
 // (0 = 45.8). Near and far hold the radii of discs and soft balls too, and so does the picture.
@@ -719,6 +741,10 @@ PATINA_API int patina_frame_create(patina_device *device, patina_frame **out);
 PATINA_API void patina_frame_destroy(patina_frame *frame);
 // Renders; blocks. On any error the last good picture stays readable.
 PATINA_API int patina_frame_render(patina_frame *frame, const patina_scene *scene);
+// Plans without rendering, and returns PATINA_ERROR_TOO_LARGE where patina_frame_render would refuse the image before it begins: a plane
+// is larger than the device's buffers, or all of them are larger than memory_cap or the memory that is free. A smaller region may do.
+// The same of the maps of lights, which a lower shadow_resolution makes smaller. What kernels keep beside their buffers is not counted.
+PATINA_API int patina_frame_check(patina_frame *frame, const patina_scene *scene);
 // Betters the picture that patina_frame_render made with settings.pixel_progressive, by a step: with shadow_progressive the next
 // sample of soft shadows, then samples of pixels: a shifted or finer picture, or some of its rows, and further ones until ms
 // have passed. For as long as stats.pixel_pending says so; else PATINA_ERROR_EMPTY. The scene must be as it was: what has changed
@@ -740,47 +766,8 @@ PATINA_API int patina_nearest_depths(const float *depths, uint32_t width, uint32
 // that failed or was cancelled, and with a cloud that they show (PATINA_ERROR_EMPTY). PATINA_ERROR_TOO_MANY_POINTS: keys do not hold the
 // numbers (patina_frame_read_numbers does). PATINA_ERROR_FILE: a mapped cloud's file, which has the numbers, cannot be read.
 PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
-// ---- shadow textures: kept by the frame while points, casters, lights' places and sizes, samples and resolution stay; lights'
-// power and colour, and lights and clouds that move together, change nothing. `light` counts the lights that cast.
-
-// Computes the whole textures of every casting light without a picture (shadow_lazy and shadow_progressive do not count).
-// Blocks; patina_frame_cancel stops it. PATINA_ERROR_EMPTY when no light casts.
-PATINA_API int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene);
-// Copies the share of a light that arrives at each point, 0..1, in file order: count floats, size in bytes must fit exactly.
-// After a lazy render only the points that the picture showed say something; the others are 1. Gone with the cloud.
-PATINA_API int patina_frame_read_shadows(const patina_frame *frame, uint32_t instance, uint32_t light, float *values,
-                                         size_t size);
-// Writes the frame's whole textures to a file, 1, 2 or 4 bytes a point and light, with what they depend on and a checksum.
-PATINA_API int patina_frame_save_shadows(const patina_frame *frame, const char *path);
-// Takes textures from such a file instead of computing them. PATINA_ERROR_FORMAT, and the frame as it was, if the file is damaged, of
-// another version, for other points, or stale: the message says which, and of which light or cloud.
-PATINA_API int patina_frame_load_shadows(patina_frame *frame, const patina_scene *scene, const char *path);
 
 PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats);
-// Statistics of the last render as a JSON object. Returns its full length; truncates to size.
-//   "passes":{..}, "skipped":{..}: milliseconds by pass, and why each other pass was left out.
-//   "layers":[{"points":..,"pixels":..},..]: points in chunks that were scattered, and pixels covered; no pixels without peeling.
-//   "lights":[{"samples":..,"error":..},..]: of the casting lights' shadows.
-//   "planes":{"peak":..,"held":..}: bytes that the plan came to before it ran, without light maps, and bytes held after it, with them.
-//   "soft":{"parts":..,"records":..}, with soft points: parts they are drawn in, and records of the largest, 80 bytes each in peak.
-//   "samples":{"grid":..,"shifts":..}: pixel_samples as pixels on each side of one, times shifted.
-//   "gl":{"dispatches":..,"empty":..,"barriers":..,"calls":..,"copies":..,"waits":..,"uploaded":..,"bytes":..}, OpenGL: what was asked of
-//     it. empty: dispatches without a workgroup, indirect ones in measured frames only. copies: between buffers, and into parts of them.
-//     waits: calls that block until submitted work is done. uploaded: bytes handed over. bytes: as below.
-//   "cpu":{"barriers":..,"bytes":..}, processor: steps of several threads, each of which ends when all are done; and bytes that the
-//     passes read and write by the plan, each of their buffers whole.
-//   "work":{"PASS":{..},..}: the fields of "gl" or "cpu" for each pass.
-PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
-// The plan as text, a line a pass, without rendering. Returns the full length.
-PATINA_API size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, char *buffer, size_t size);
-// 1: from the next render on no planes share memory, so that patina_frame_dump_planes has them all; takes more of it. 0: as at first.
-PATINA_API int patina_frame_keep_planes(patina_frame *frame, uint32_t keep);
-// 1: from the next render on a GPU times each pass by itself, and empty indirect dispatches are counted. That costs a few calls for each
-// pass. 0, as at first: a GPU times the passes over points, and all others between them together, by the name "pixels".
-PATINA_API int patina_frame_measure(patina_frame *frame, uint32_t measure);
-// Writes every plane of the last render as a raw little-endian file into a folder, with a .txt line of its shape. Bins of discs are not
-// written, nor planes whose memory others took.
-PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *folder);
 
 #ifdef __cplusplus
 }
@@ -788,11 +775,15 @@ PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *f
 
 // The rest of the manual, which this header includes.
 #include "builder.h"
+#include "diagnostics.h"
+#include "drawings.h"
 #include "files.h"
+#include "measure.h"
 #include "meshes.h"
 #include "pages.h"
 #include "panorama.h"
 #include "parts.h"
 #include "points.h"
+#include "shadows.h"
 #include "tasks.h"
 #endif

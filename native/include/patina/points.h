@@ -142,6 +142,19 @@ typedef struct patina_pick {
 // blocks; progress may be NULL, and stops it from any thread. About 13 ns a point of one core, in chunks that the outline may hold.
 PATINA_API int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, const patina_pick *pick,
                                  patina_progress *progress, uint8_t *bits, size_t size);
+
+typedef struct patina_picked {
+    size_t struct_size;
+    uint32_t found;     // 1; 0: there is no such point, and all else is 0
+    uint64_t number;    // of the point, in the given order
+    double position[3]; // object space
+    double distance;    // from the place, in pixels
+} patina_picked;
+
+// Of the points that patina_scene_pick would pick, the one that is projected nearest to a place in the image: x, y in pixels of the full
+// picture from its bottom left. pick: has a polygon. Equally near: the one with the smallest number. Cost and threads: as patina_scene_pick.
+PATINA_API int patina_scene_pick_nearest(const patina_scene *scene, const patina_frame *frame, const patina_pick *pick,
+                                         const double place[2], patina_progress *progress, patina_picked *picked);
 // Mixes a colour into the pixels of a COMBINED pass whose nearest point is selected by its instance's mask, filled ones too: for
 // viewports. scene: rendered last in the frame. strength: 0..1, the colour's share. pixels: width * height * 4.
 PATINA_API int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene, const float color[3],

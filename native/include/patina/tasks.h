@@ -56,6 +56,11 @@ PATINA_API int patina_task_end_build(patina_builder *builder, patina_progress *p
 PATINA_API int patina_task_analyse_file(const char *from, const patina_analysis_desc *desc, uint64_t memory, const char *to,
                                         patina_progress *progress, patina_task **out);
 PATINA_API int patina_task_verify(const char *path, patina_progress *progress, patina_task **out); // patina_cloud_verify
+// patina_cloud_open_at, then patina_cloud_thin of it. offset: 3 numbers, copied. The cloud is closed again. hidden must stay until the
+// task is done.
+PATINA_API int patina_task_thin(const char *path, const double *offset, const uint8_t *hidden, size_t size, uint64_t room,
+                                float *positions, float *colors, float *normals, float *scalars, uint64_t *count,
+                                patina_task **out);
 PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block
 // Waits for the end and returns what the call returned; its message is at the task.
 PATINA_API int patina_task_wait(patina_task *task);

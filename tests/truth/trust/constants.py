@@ -16,6 +16,8 @@ import numpy as np
 from .boost import LEAF, Calibration
 
 ROOT = Path(__file__).resolve().parents[3]
+CONSTANTS = ROOT / "native/scene/analysis/trust_constants.h"
+FEATURES = ROOT / "native/scene/analysis/trust_features.h"
 COUNT = 6000  # points of the cloud that the sum is over
 
 

@@ -101,7 +101,7 @@ def main() -> int:
     options = parser.parse_args()
     folder, names = None if options.folder == "plain" else Path(options.folder), train.names_of_features(options.folder)
     if options.in_force:
-        model = constants.read(train.CONSTANTS.read_text())
+        model = constants.read(constants.CONSTANTS.read_text())
         others = samples.load_all([one.name for one in campaigns.group(options.scenes)], folder, len(names))
         print(tables(others, {name: model.judged(one.values) for name, one in others.items()}, model.calibration, model.limit))
         return 0

@@ -143,7 +143,7 @@ class Written(unittest.TestCase):
         if native is None:
             print("skip test_check_notices_other_features: no library")
             self.skipTest("no library")
-        text = re.sub(r"^// Features' sum: .*\n", "", train.CONSTANTS.read_text(), flags=re.M)
+        text = re.sub(r"^// Features' sum: .*\n", "", constants.CONSTANTS.read_text(), flags=re.M)
         self.assertIn("was not written", train.complaint(text))
         now, head = constants.sum_of_features(native), "// Features:"
         self.assertEqual(train.complaint(text.replace(head, f"// Features' sum: {now}\n{head}")), "")
@@ -159,15 +159,15 @@ class Written(unittest.TestCase):
         cloud = native.Cloud(position, None, None)
         values = np.zeros((len(position), native.abi.TRUST_FEATURES), np.float32)
         cloud.analyse(trust_features=values)
-        levels = constants.read(train.CONSTANTS.read_text()).level(values)
+        levels = constants.read(constants.CONSTANTS.read_text()).level(values)
         self.assertEqual(np.bincount(levels, minlength=boost.LEVELS).tolist(), list(cloud.trusts))
         self.assertGreater(len(set(levels)), 8)
 
     def test_constants_are_of_today(self) -> None:
         """What the library was built with was made from today's scenes, scanners, trainer and features: what train.py --check says."""
-        text = train.CONSTANTS.read_text() if train.CONSTANTS.is_file() else ""
+        text = constants.CONSTANTS.read_text() if constants.CONSTANTS.is_file() else ""
         if "tests/truth/trust/train.py" not in text:
-            print(f"skip test_constants_are_of_today: {train.CONSTANTS} was not written by train.py")
+            print(f"skip test_constants_are_of_today: {constants.CONSTANTS} was not written by train.py")
             self.skipTest("not written by train.py")
         sum_, _, names, scenes = train.told(text)
         self.assertEqual(samples.checked(scenes), scenes)

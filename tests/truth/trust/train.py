@@ -5,8 +5,8 @@
     build/out/venv/bin/python tests/truth/trust/train.py [FOLDER] --check
 
 FOLDER has NAME.f32 of each scene and NAME.known.f32 of those whose stations are known, as measure.py writes them: the library's
-features, raw float32 (points, F). `plain` in its place: those of features.py. FILE.h is native/scene/trust_constants.h by default;
-native/scene/trust_model.c reads it. Scenes that split.json holds out are refused. The trees are trained on all scenes; their
+features, raw float32 (points, F). `plain` in its place: those of features.py. FILE.h is native/scene/analysis/trust_constants.h by default;
+native/scene/analysis/trust_model.c reads it. Scenes that split.json holds out are refused. The trees are trained on all scenes; their
 calibration and the default threshold come from trees that were trained on other scenes than they are judged on. The same input gives
 the same bytes.
 
@@ -31,8 +31,6 @@ from truth.scans import campaigns, exact  # noqa: E402
 from truth.scans.scanner import CAUSES  # noqa: E402
 from truth.trust import boost, constants, features, report, samples  # noqa: E402
 
-CONSTANTS = ROOT / "native/scene/trust_constants.h"
-FEATURES = ROOT / "native/scene/trust_features.h"
 TREES = 100
 SURE_AFTER = 10  # trees, after which most points need no more
 SURE_LOST = 0.002  # of the wrong samples may count as sure then
@@ -135,7 +133,7 @@ def model(all_: dict[str, samples.Samples], trees: int) -> tuple[boost.Forest, b
 
 
 def names_of_features(folder: str) -> list[str]:
-    return list(features.NAMES) if folder == "plain" else re.findall(r"X\((\w+), \"", FEATURES.read_text())
+    return list(features.NAMES) if folder == "plain" else re.findall(r"X\((\w+), \"", constants.FEATURES.read_text())
 
 
 def as_c(forest: boost.Forest, calibration: boost.Calibration, limit: int, names: list[str], scenes: list[str], date: str,
@@ -192,7 +190,7 @@ def main() -> int:
     parser.add_argument("folder", nargs="?", default="", help="of features, or plain")
     parser.add_argument("--scenes", default="trained")
     parser.add_argument("--trees", type=int, default=TREES)
-    parser.add_argument("--out", type=Path, default=CONSTANTS)
+    parser.add_argument("--out", type=Path, default=constants.CONSTANTS)
     parser.add_argument("--report", type=Path, help="the tables of report.py, of scores by trees trained on other scenes")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--date", default=datetime.date.today().isoformat(), help="written into the file")
