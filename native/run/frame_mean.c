@@ -148,8 +148,9 @@ static float noise(const struct pt_mean *mean)
         float most = 0.0f;
         for (int k = 0; k < 4; k++) {
             const float a = mean->sums[0][4 * i + k] * share[0], b = mean->sums[1][4 * i + k] * share[1];
-            const float off = (a - b) * (a - b), level = fmaxf(0.5f * (a + b), DARK);
-            most = fmaxf(most, k < 3 ? 0.25f * off / level : off); // the square of half a root's inverse
+            const float squared = (a - b) * (a - b), level = 0.5f * (a + b) > DARK ? 0.5f * (a + b) : DARK;
+            const float off = k < 3 ? 0.25f * squared / level : squared; // the square of half a root's inverse
+            most = off > most ? off : most;
         }
         sum += (double)most;
         pixels += most > 0.0f;
@@ -159,18 +160,46 @@ static float noise(const struct pt_mean *mean)
 
 // ---- steps ---------------------------------------------------------------------------------------------------------------
 
+// Rows of the mean that threads add up, or share out.
+struct rows {
+    const struct pt_mean *mean;
+    const float *fine; // of the first row
+    float *out;
+    uint32_t first; // of the rows, in the region
+};
+
 // Adds a finer picture's rows to those of the mean.
-static void add_up(const float *fine, uint32_t grid, uint32_t width, uint32_t rows, float *sum)
+static void add_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
-    for (uint32_t y = 0; y < rows; y++)
+    (void)thread;
+    const struct rows *rows = context;
+    const uint32_t grid = rows->mean->sampling.grid, width = rows->mean->width;
+    for (uint32_t y = begin; y < end; y++)
         for (uint32_t j = 0; j < grid; j++) {
-            const float *from = fine + 4 * ((size_t)y * grid + j) * width * grid;
-            float *to = sum + 4 * (size_t)y * width;
+            const float *restrict from = rows->fine + 4 * ((size_t)y * grid + j) * width * grid;
+            float *restrict to = rows->out + 4 * (size_t)y * width;
             for (uint32_t x = 0; x < width; x++, to += 4)
                 for (uint32_t i = 0; i < grid; i++, from += 4)
                     for (int k = 0; k < 4; k++)
                         to[k] += from[k];
         }
+}
+
+// Writes the mean of rows, in as many pictures as each has.
+static void share_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    (void)thread;
+    const struct rows *rows = context;
+    const struct pt_mean *mean = rows->mean;
+    const uint32_t finer = mean->sampling.grid * mean->sampling.grid;
+    for (uint32_t row = rows->first + begin; row < rows->first + end; row++) {
+        const size_t numbers = 4 * (size_t)mean->width, at = row * numbers;
+        const float share = 1.0f / (float)(finer * (mean->done + (row < mean->rows)));
+        float *restrict to = rows->out + (row - rows->first) * numbers;
+        const float *one = mean->sums[0] + at, *other = mean->sampling.shifts > 1 ? mean->sums[1] + at : NULL;
+        for (size_t i = 0; i < numbers; i++)
+            to[i] = (one[i] + (other ? other[i] : 0.0f)) * share;
+    }
 }
 
 static void end_picture(struct patina_frame *frame, struct pt_mean *mean)
@@ -207,8 +236,9 @@ static int draw_step(struct patina_frame *frame, const struct patina_scene *scen
                               (size_t)mean->width * grid * (end - first) * grid * 4 * sizeof *mean->fine);
     if (error)
         return error;
-    add_up(mean->fine, grid, mean->width, end - first,
-           mean->sums[pt_sample_half(&mean->sampling, mean->done)] + 4 * (size_t)first * mean->width);
+    float *sums = mean->sums[pt_sample_half(&mean->sampling, mean->done)];
+    struct rows rows = {mean, mean->fine, sums + 4 * (size_t)first * mean->width, first};
+    pt_parallel(frame->device->pool, end - first, 0, add_rows, &rows);
     mean->rows = end;
     if (end == mean->height)
         end_picture(frame, mean);
@@ -230,12 +260,8 @@ static int show(struct patina_frame *frame)
     const uint32_t most = finer * mean->band, have = mean->done ? mean->height : mean->rows; // rows
     for (uint32_t y = 0; y < have; y += most) {
         const uint32_t end = y + most < have ? y + most : have;
-        for (uint32_t row = y; row < end; row++) {
-            const float share = 1.0f / (float)(finer * (mean->done + (row < mean->rows)));
-            for (size_t i = 4 * (size_t)row * width, to = 4 * (size_t)(row - y) * width; i < 4 * (size_t)(row + 1) * width;
-                 i++, to++)
-                mean->fine[to] = (mean->sums[0][i] + (mean->sampling.shifts > 1 ? mean->sums[1][i] : 0.0f)) * share;
-        }
+        struct rows rows = {mean, NULL, mean->fine, y};
+        pt_parallel(frame->device->pool, end - y, 0, share_rows, &rows);
         int error = frame->device->ops->buffer_write(frame->device, &frame->planes.at[PT_PLANE_COMBINED][0],
                                                      4 * (size_t)y * width * sizeof(float), mean->fine,
                                                      4 * (size_t)(end - y) * width * sizeof(float));
