@@ -137,27 +137,37 @@ class PATINA_OT_frame_points(Operator):
         if not corners:
             self.report({'WARNING'}, "There are no points to frame")
             return {'CANCELLED'}
-        camera = context.scene.camera
-        flat = [value for corner in corners for value in corner]
-        place, scale = camera.evaluated_get(depsgraph).camera_fit_coords(depsgraph, flat)
-        rotation = camera.matrix_world.to_quaternion()
-        camera.matrix_world = Matrix.LocRotScale(place, rotation, camera.matrix_world.to_scale())
-        if camera.data.type == 'ORTHO':
-            camera.data.ortho_scale = scale
-        self._see(camera, place, rotation @ Vector((0.0, 0.0, -1.0)), corners)
-        _move_views(context, corners)
+        frame(context, corners)
+        camera = context.scene.camera.data
+        before = camera.clip_start, camera.clip_end
+        widen_clips(context.scene.camera, corners)
+        for name, old, new in zip(("Start", "End"), before, (camera.clip_start, camera.clip_end), strict=True):
+            if new != old:
+                self.report({'INFO'}, f"Patina: set the camera's Clip {name} to {new:.4g}")
         return {'FINISHED'}
 
-    def _see(self, camera: bpy.types.Object, place: Vector, forward: Vector, corners: list[Vector]) -> None:
-        """Nothing of it may be nearer or farther than the camera sees."""
-        near = min((corner - place).dot(forward) for corner in corners)
-        far = max((corner - place).length for corner in corners)
-        if 0.0 < near < camera.data.clip_start:
-            camera.data.clip_start = 0.5 * near
-            self.report({'INFO'}, f"Patina: set the camera's Clip Start to {camera.data.clip_start:.4g}")
-        if camera.data.clip_end < far:
-            camera.data.clip_end = 1.2 * far
-            self.report({'INFO'}, f"Patina: set the camera's Clip End to {camera.data.clip_end:.4g}")
+
+def frame(context: Context, corners: list[Vector]) -> None:
+    """Moves the scene's camera and the 3D views, without rotating them, so that they see all corners."""
+    camera, depsgraph = context.scene.camera, context.evaluated_depsgraph_get()
+    flat = [value for corner in corners for value in corner]
+    place, scale = camera.evaluated_get(depsgraph).camera_fit_coords(depsgraph, flat)
+    camera.matrix_world = Matrix.LocRotScale(place, camera.matrix_world.to_quaternion(), camera.matrix_world.to_scale())
+    if camera.data.type == 'ORTHO':
+        camera.data.ortho_scale = scale
+    _move_views(context, corners)
+
+
+def widen_clips(camera: bpy.types.Object, corners: list[Vector]) -> None:
+    """Changes Clip Start and Clip End where a corner is nearer or farther than the camera sees."""
+    place, rotation, _ = camera.matrix_world.decompose()
+    forward = rotation @ Vector((0.0, 0.0, -1.0))
+    near = min((corner - place).dot(forward) for corner in corners)
+    far = max((corner - place).length for corner in corners)
+    if 0.0 < near < camera.data.clip_start:
+        camera.data.clip_start = 0.5 * near
+    if camera.data.clip_end < far:
+        camera.data.clip_end = 1.2 * far
 
 
 def _move_views(context: Context, corners: list[Vector]) -> None:

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 
 import bpy
+import numpy as np
 from bpy.types import Object, Scene
 
 from .. import jobs, native, point_data
@@ -14,6 +15,9 @@ from ..sync.points import attributes, coloring, linked
 from . import view_transform
 
 PLASTER = "plaster"  # the style of points that have positions alone
+FLAT = 0.1  # of the stretched intensity: where the middle half of the points spans less, they look alike without light
+BRIGHT = 0.5  # of the stretched intensity: where the median is less, points that look alike are too dark for light
+SAMPLED = 1 << 16  # points of a linked cloud whose colors are compared
 
 
 class Data(Enum):
@@ -26,40 +30,92 @@ class Data(Enum):
 
 
 def data_of(obj: Object, frame: int) -> Data:
-    """What the points of an object have. Linked files are asked for colors alone. PatinaError if a linked file cannot be read."""
+    """What the points of an object have that tells them apart: one color alone, or an intensity that would be black nearly everywhere, does
+    not. Linked files are asked for colors alone. PatinaError if a linked file cannot be read."""
     if obj.patina.linked_file:
-        source = linked.source_of(obj, frame, [])
-        found = source and jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
-        return Data.COLORS if not found or found.has_colors else Data.POSITIONS
+        found = _cloud_of(obj, frame)
+        if not found or found.has_colors and one_color(obj, frame) is None:
+            return Data.COLORS
+        return Data.POSITIONS
     with attributes.readable(obj) as data:
         count = point_data.count_of(data)
         rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
-        if rgb is not None and attributes.colored(rgb).any():
+        if rgb is not None and attributes.constant(rgb) is None and attributes.colored(rgb).any():
             return Data.COLORS
-        if attributes.intensity_name(obj.data):
+        spread = _intensities(data, count)
+        if spread and (spread[1] >= FLAT or spread[0] >= BRIGHT):
             return Data.INTENSITY
         classes = attributes.classes(data, count, obj.patina.colors.class_attribute) if count else None
         return Data.CLASSES if classes is not None and classes.any() else Data.POSITIONS
 
 
-def choose(scene: Scene, points: Sequence[Object]) -> list[str]:
+def one_color(obj: Object, frame: int) -> np.ndarray | None:
+    """The color that all points of an object have, or that all of many points of a linked one have: sRGB bytes or linear floats. None: they
+    have none, or several. PatinaError if a linked file cannot be read."""
+    if obj.patina.linked_file:
+        found = _cloud_of(obj, frame)
+        return attributes.constant(found.thinned(min(SAMPLED, found.count))[1]) if found and found.has_colors and found.count else None
+    with attributes.readable(obj) as data:
+        count = point_data.count_of(data)
+        rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
+        return None if rgb is None else attributes.constant(rgb)
+
+
+def _cloud_of(obj: Object, frame: int) -> native.Cloud | None:
+    source = linked.source_of(obj, frame, [])
+    return source and jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
+
+
+def _intensities(data: bpy.types.ID, count: int) -> tuple[float, float] | None:
+    """Of the intensities, stretched from 0 to 1 as they are shown: the median, and the distance between the quartiles. None: there are
+    none, or all are the same."""
+    values = attributes.scalars(data, count, attributes.intensity_name(data)) if count else None
+    values = None if values is None else values[np.isfinite(values)]
+    if values is None or not len(values):
+        return None
+    share = coloring.SHARE
+    least, low, first, median, last, high, most = (float(value) for value in np.quantile(values, (0.0, share, 0.25, 0.5, 0.75, 1.0 - share, 1.0)))
+    low, high = (low, high) if low < high else (least, most)
+    return ((median - low) / (high - low), (last - first) / (high - low)) if low < high else None
+
+
+def kinds_of(scene: Scene, points: Sequence[Object]) -> dict[Object, Data]:
+    """What each object has. Colors, where a file cannot be read."""
+    return {obj: _data(obj, scene.frame_current) for obj in points}
+
+
+def is_lit(obj: Object, kind: Data) -> bool:
+    """Whether points with such data are drawn in the light of the scene."""
+    patina = obj.patina
+    return patina.lighting == 'LIT' or patina.lighting == 'AUTO' and not (patina.colors.source in {'OWN', 'MATERIAL'} and kind == Data.COLORS)
+
+
+def choose(scene: Scene, found: Mapping[Object, Data]) -> list[str]:
     """Sets the look of points whose look nobody has chosen yet. Returns what was done, in sentences without full stops.
 
-    Colors are shown unlit and as they were taken. Intensity is stretched between its 1st and 99th percentile. Classes get the LAS
-    colors. If no object has any of these, the scene gets the style Plaster."""
-    kinds = {obj: _data(obj, scene.frame_current) for obj in points if obj.patina.colors.source == 'OWN'}
+    Colors are shown unlit and as they were taken. Intensity is stretched between its 1st and 99th percentile, and lit where most points have
+    nearly the same. Classes get the LAS colors. If light shows the form of all objects, the scene gets the style Plaster."""
+    frame = scene.frame_current
+    kinds = {obj: kind for obj, kind in found.items() if obj.patina.colors.source == 'OWN'}
+    flat = {obj for obj, kind in kinds.items() if kind == Data.INTENSITY and _is_flat(obj)}
     said = []
-    if kinds and all(kind == Data.POSITIONS for kind in kinds.values()):
+    plaster = bool(kinds) and all(kind == Data.POSITIONS or obj in flat for obj, kind in kinds.items())
+    if plaster:
+        what = "no colors" if len(flat) < len(kinds) else "nearly the same intensity"
+        if any(kind == Data.POSITIONS and one_color(obj, frame) is not None for obj, kind in kinds.items()):
+            what = "only one color"
         scene.patina.style.chosen = PLASTER
-        return ["The points have no colors: the style Plaster lights them"]
+        said.append(f"The points have {what}: the style Plaster lights them")
     for obj, kind in kinds.items():
         if kind == Data.INTENSITY:
-            said.append(_show_intensity(obj, scene.frame_current))
+            said.append(_show_intensity(obj, frame))
         elif kind == Data.CLASSES:
             name = next(name for name in attributes.CLASS_NAMES if name in obj.data.attributes)
-            coloring.apply(obj, coloring.Choice("Class", 'SCALAR', name, 'CLASSES'), scene.frame_current)
+            coloring.apply(obj, coloring.Choice("Class", 'SCALAR', name, 'CLASSES'), frame)
             said.append(f"'{obj.name}' is colored by its classes")
-    if any(kind != Data.POSITIONS for kind in kinds.values()) and view_transform.changes_colors(scene):
+        elif kind == Data.POSITIONS and not plaster:
+            said += filter(None, [_light_one_color(obj, frame)])
+    if not plaster and any(kind != Data.POSITIONS for kind in kinds.values()) and view_transform.changes_colors(scene):
         bpy.ops.render.patina_true_colors()
         said.append("The view transform is Standard, which shows the colors as they were taken")
     return said
@@ -72,16 +128,42 @@ def _data(obj: Object, frame: int) -> Data:
         return Data.COLORS  # the viewport reports the file
 
 
+def _is_flat(obj: Object) -> bool:
+    """Whether most points have nearly the same intensity, which no stretch tells apart: scanners cut off what is too bright for them."""
+    with attributes.readable(obj) as data:
+        spread = _intensities(data, point_data.count_of(data))
+    return spread is not None and spread[1] < FLAT
+
+
 def _show_intensity(obj: Object, frame: int) -> str:
     name = attributes.intensity_name(obj.data)
+    if obj.patina.lighting == 'AUTO' and _is_flat(obj):
+        obj.patina.lighting = 'LIT'
     coloring.apply(obj, coloring.Choice("Intensity", 'SCALAR', name, 'GREY'), frame)
     group = obj.patina.colors
     stretched = f", stretched from {group.range_min:,.6g} to {group.range_max:,.6g}" if group.use_range else ""
-    return f"'{obj.name}' is colored by '{name}'{stretched}"
+    lit = ", and lit, since most points have nearly the same" if obj.patina.lighting == 'LIT' else ""
+    return f"'{obj.name}' is colored by '{name}'{stretched}{lit}"
+
+
+def _light_one_color(obj: Object, frame: int) -> str:
+    """Lights points that have one color alone, which shows no form without light. Black ones become as points without colors."""
+    color = one_color(obj, frame)
+    if color is None:
+        return ""
+    if not attributes.colored(color[None]).any():
+        obj.patina.colors.source = 'FIXED'
+    elif obj.patina.lighting == 'AUTO':
+        obj.patina.lighting = 'LIT'
+    return f"The points of '{obj.name}' have only one color, and are lit"
 
 
 def color_imported(obj: Object, frame: int) -> str:
-    """Shows new points in their intensity if they have no colors and nobody has chosen a look. Returns what was done, or ""."""
-    if obj.patina.linked_file or obj.patina.colors.source != 'OWN' or _data(obj, frame) != Data.INTENSITY:
+    """Shows new points in their intensity if they have no colors and nobody has chosen a look, and lights those of one color. Returns what
+    was done, or ""."""
+    if obj.patina.colors.source != 'OWN':
         return ""
-    return _show_intensity(obj, frame)
+    kind = _data(obj, frame)
+    if kind == Data.INTENSITY:
+        return _show_intensity(obj, frame)
+    return "" if kind == Data.COLORS else _light_one_color(obj, frame)

@@ -158,9 +158,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             self._add(context, obj, own, units)
             if splats:
                 obj.patina.opacity_attribute, obj.patina.radius_attribute = "opacity", "radius"
-            if context.engine == set_up.PatinaRenderEngine.bl_idname:  # with another engine, Set Up chooses the look
-                if said := first_look.color_imported(obj, context.scene.frame_current):
-                    self.report({'INFO'}, told(f"Patina: {said}"))
+            self._color(context, obj)
             if not splats and (said := (yield from level.note(obj, self._progress))):
                 self.report({'INFO'}, told(f"Patina: {said}"))
         self._finish(context)
@@ -208,6 +206,12 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         obj.select_set(True)
         context.view_layer.objects.active = obj
 
+    def _color(self, context: Context, obj: bpy.types.Object) -> None:
+        """The first look of new points; with another engine, Set Up chooses it."""
+        if context.engine == set_up.PatinaRenderEngine.bl_idname:
+            if said := first_look.color_imported(obj, context.scene.frame_current):
+                self.report({'INFO'}, told(f"Patina: {said}"))
+
     def _finish(self, context: Context) -> None:
         """Once the points are there, and selected."""
         if self.frame and bpy.ops.object.patina_frame_points.poll():
@@ -248,6 +252,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             obj.patina.sequence.start = context.scene.frame_start
             obj.patina.stream = self.stream
             self._add(context, obj, item.origin, item.units)
+            if not self.sequence and not item.cloud.stream:
+                self._color(context, obj)
         self._finish(context)
         count = sum(item.cloud.count for item in found.values())
         self.report({'INFO'}, f"Linked {count:,} point{'s' * (count != 1)}. {_told_next(context)}")

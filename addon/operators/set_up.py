@@ -60,41 +60,65 @@ def _reaches(lamp: Object, corners: Sequence[Vector]) -> bool:
 
 
 class PATINA_OT_set_up(Operator):
-    """Set up the scene: delete the default cube, frame the points, look through the camera. Scan colors are unlit, intensity and classes become colors, other points get the style Plaster. Adds a headlight if no light reaches lit points"""
+    """Set up the scene: delete the default cube, frame the points, look through the camera. Scan colors are unlit, intensity and classes become colors, other points get the style Plaster. Adds a headlight if no light reaches the points"""
 
     bl_idname = "scene.patina_set_up"
     bl_label = "Set Up for Points"
     bl_options = {'REGISTER', 'UNDO'}
 
     def execute(self, context: Context) -> set[str]:
-        scene = context.scene
         points = [obj for obj in context.view_layer.objects if point_data.is_cloud(obj) and obj.visible_get()]
         if not points:
             self.report({'ERROR'}, "Patina: the scene has no points")
             return {'CANCELLED'}
-        cube = scene.objects.get("Cube")
-        fresh = untouched(scene)
-        if fresh and cube:
-            bpy.data.objects.remove(cube)
-        scene.render.engine = PatinaRenderEngine.bl_idname
-        context.view_layer.update()
-        for obj in context.view_layer.objects:
-            obj.select_set(obj in points)
-        if bpy.ops.object.patina_frame_points.poll():
-            bpy.ops.object.patina_frame_points()
-            _fit_clips(context, points, fresh)
-            _look_through_camera(context)
-        for text in first_look.choose(scene, points):
+        for text in apply(context, points):
             self.report({'INFO'}, text)
-        if unlit(scene, points):
-            scene.patina.studio.use_headlight = True
-            self.report({'INFO'}, "No light reaches the points. Enabled the headlight for points without colors")
         return {'FINISHED'}
 
 
+def apply(context: Context, points: Sequence[Object]) -> list[str]:
+    """Sets up the scene for visible points. Returns what was done, in sentences without full stops."""
+    scene = context.scene
+    cube = scene.objects.get("Cube")
+    fresh = untouched(scene)
+    if fresh and cube:
+        bpy.data.objects.remove(cube)
+    scene.render.engine = PatinaRenderEngine.bl_idname
+    context.view_layer.update()
+    for obj in context.view_layer.objects:
+        obj.select_set(obj in points)
+    said = _frame(context, points, fresh) if scene.camera else []
+    kinds = first_look.kinds_of(scene, points)
+    said += first_look.choose(scene, kinds)
+    if unlit(scene, points):
+        scene.patina.studio.use_headlight = True
+        lit = any(first_look.is_lit(obj, kind) for obj, kind in kinds.items())
+        said.append("No light reaches the points. Enabled the headlight" if lit else
+                    "Enabled the headlight for color ramps and lit styles. The points' own colors are shown without light")
+    return said
+
+
+def _frame(context: Context, points: Sequence[Object], fresh: bool) -> list[str]:
+    """The camera and the 3D views see the points, and their clip distances fit. fresh: nobody has chosen others. Returns what was set."""
+    scene = context.scene
+    camera = scene.camera.data
+    before = camera.clip_start, camera.clip_end
+    try:
+        corners = analyze.corners_of(context.evaluated_depsgraph_get(), set(points), scene.frame_current)
+    except native.PatinaError as error:
+        return [f"The camera stays where it is: {error}"]
+    if corners:
+        analyze.frame(context, corners)
+        analyze.widen_clips(scene.camera, corners)
+    _fit_clips(context, points, fresh)
+    _look_through_camera(context)
+    changed = [f"{name} to {new:.6g}" for name, old, new in
+               zip(("Clip Start", "Clip End"), before, (camera.clip_start, camera.clip_end), strict=True) if new != old]
+    return [f"Set the camera's {' and '.join(changed)}"] if changed else []
+
+
 def _fit_clips(context: Context, points: Sequence[Object], fresh: bool) -> None:
-    """The clip distances of the scene's camera and of the 3D views, for the points as they were framed just now. fresh: nobody has
-    chosen others."""
+    """The clip distances of the scene's camera and of the 3D views, for the points as they were framed just now."""
     context.view_layer.update()
     corners = [corner for obj in points for corner in _corners(context.scene, obj)]
     extent = clip_range.extent_of(corners)

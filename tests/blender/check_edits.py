@@ -76,7 +76,8 @@ def test_hide_and_restore():
 def test_select_mesh_by_value():
     """In Object and Edit Mode the same points of a mesh are selected, by an attribute or by height; hidden ones never."""
     new_scene()
-    obj, = import_ply(wall("values.ply", [("intensity", "f4", np.arange(ROWS * ROWS))]))
+    # of one color, it would be colored by its intensity, which an empty attribute would mean then
+    obj, = import_ply(wall("values.ply", [("intensity", "f4", np.arange(ROWS * ROWS))], color=(np.arange(ROWS * ROWS) % 200, 100, 50)))
     obj.rotation_euler = (np.pi / 2, 0, 0)  # rows are heights now
     bpy.context.view_layer.objects.active = obj
     if obj.type != 'MESH':

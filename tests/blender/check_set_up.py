@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """After the first import into Blender's start scene: engine, camera and light are offered, and do what they say."""
 
+import ctypes
+import os
+import sys
+from contextlib import contextmanager
+
 import bpy
 import check_linked  # noqa: F401  no test leaves files with the user
 import numpy as np
@@ -80,7 +85,8 @@ def test_ramps_of_coloured_surveys_are_lit():
     scene = start_scene()
     points, _, _ = sphere(20000, 100.0, (0, 0, 0))
     rows = [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")]
-    obj, = import_ply(write_ply("colored_survey.ply", rows + [(name, "u1", np.full(len(points), 180)) for name in ("red", "green", "blue")]))
+    shade = np.where(np.arange(len(points)) % 1000, 180, 181)  # one alone would be no color
+    obj, = import_ply(write_ply("colored_survey.ply", rows + [(name, "u1", shade) for name in ("red", "green", "blue")]))
     check(set_up.unlit(scene, [obj]), "a lamp of a kilowatt does not reach")
     check(bpy.ops.scene.patina_set_up() == {'FINISHED'} and scene.patina.studio.use_headlight, "no headlight")
     scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
@@ -91,6 +97,68 @@ def test_ramps_of_coloured_surveys_are_lit():
     obj.patina.colors.source = 'HEIGHT'
     ramp = render()["Combined"][..., :3].max(axis=2)
     check((ramp[shown] > 0.1).mean() > 0.8, f"{(ramp[shown] > 0.1).mean():.0%} of the points are bright")
+
+
+@contextmanager
+def printed():
+    """Within: Blender's standard output, which reports of operators go to, as a list with one text."""
+    texts, path, before = [], SCRATCH / "printed.txt", os.dup(1)
+    file = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_TRUNC)
+    sys.stdout.flush()
+    os.dup2(file, 1)
+    try:
+        yield texts
+    finally:
+        sys.stdout.flush()
+        ctypes.CDLL(None).fflush(None)
+        os.dup2(before, 1)
+        os.close(before)
+        os.close(file)
+        texts.append(path.read_text())
+
+
+def small_picture(scene):
+    """Linear gray of the points, and whether a pixel shows one: Set Up framed them."""
+    scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
+    scene.render.film_transparent, scene.patina.samples = True, 1
+    scene.patina.studio.use_background = False
+    picture = render()["Combined"]
+    shown = picture[..., 3] > 0.99
+    check(shown.mean() > 0.1, f"{shown.mean():.0%} of the image shows points")
+    return picture[..., :3], shown
+
+
+def test_set_up_reports_the_clip_distances_once():
+    """What the camera has afterward, in one line."""
+    scene = start_scene()
+    import_ply(gray("reported_clips.ply", 100.0))
+    with printed() as texts:
+        bpy.ops.scene.patina_set_up()
+    lines = [line for line in texts[0].splitlines() if "Clip" in line]
+    camera = scene.camera.data
+    check(len(lines) == 1 and f"Clip Start to {camera.clip_start:.6g} and Clip End to {camera.clip_end:.6g}" in lines[0], f"{camera.clip_end}: {lines}")
+    with printed() as texts:
+        bpy.ops.scene.patina_set_up()
+    check("Clip" not in texts[0], f"nothing changed: {texts[0]}")
+
+
+def test_set_up_says_whom_the_headlight_lights():
+    """Points with colors of their own need none, and nobody says that they have none."""
+    points, colors, _ = sphere(5000, 100.0, (0, 0, 0))
+    rows = [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")]
+    colored = write_ply("headlight.ply", rows + [(name, "u1", colors[:, i]) for i, name in enumerate(("red", "green", "blue"))])
+    for link in (False, True):
+        scene = start_scene()
+        obj, = import_ply(colored, link=link)
+        said = set_up.apply(bpy.context, [obj])
+        lines = [text for text in said if "headlight" in text]
+        check(scene.patina.studio.use_headlight and lines == ["Enabled the headlight for color ramps and lit styles. The points' own colors are "
+                                                              "shown without light"], f"linked {link}: {said}")
+    scene = start_scene()
+    obj, = import_ply(colored)
+    obj.patina.lighting = 'LIT'
+    said = set_up.apply(bpy.context, [obj])
+    check("No light reaches the points. Enabled the headlight" in said, f"lit: {said}")
 
 
 def columns_of(scale, **scalars):
@@ -118,10 +186,10 @@ def test_brightness_of_text_files():
     Patina is the engine already. Other columns do not, nor does brightness where the file has colors."""
     points, _, _ = sphere(4000, 1.0, (0, 0, 0))
 
-    def imported(column, engine, values, more=""):
+    def imported(column, engine, values, more=("",)):
         scene = start_scene()
         scene.render.engine = engine
-        rows = "\n".join(f"{x:.4f},{y:.4f},{z:.4f},{value:g}{more}" for (x, y, z), value in zip(points, values, strict=True))
+        rows = "\n".join(f"{x:.4f},{y:.4f},{z:.4f},{value:g}{more[number % len(more)]}" for number, ((x, y, z), value) in enumerate(zip(points, values, strict=True)))
         path = SCRATCH / f"brightness {column.split(',')[0]}.csv"
         path.write_text(f"x,y,z,{column}\n{rows}\n")
         bpy.ops.import_scene.patina_points(filepath=str(path))
@@ -150,7 +218,7 @@ def test_brightness_of_text_files():
             check(np.ptp(gray[:, 0]) > 0.8 and np.ptp(gray, axis=1).max() < 0.2, f"{said}: {gray.min(axis=0)} to {gray.max(axis=0)}")
     _, obj = imported("amount", 'PATINA', wide)
     check(obj.patina.colors.source == 'OWN', "another column")
-    _, obj = imported("Grey,red,green,blue", 'PATINA', wide, ",200,100,50")
+    _, obj = imported("Grey,red,green,blue", 'PATINA', wide, (",200,100,50", ",100,50,200"))
     check(obj.patina.colors.source == 'OWN', "the file has colors")
 
 
@@ -158,9 +226,98 @@ def test_first_look_of_intensity_says_the_range():
     from patina.operators import first_look
     start_scene()
     obj, = import_ply(write_ply("first_range.ply", columns_of(1.0, intensity=lambda points: 30000 + 20000 * points[:, 2])))
-    said, = (text for text in first_look.choose(bpy.context.scene, [obj]) if "intensity" in text)
+    said, = (text for text in first_look.choose(bpy.context.scene, first_look.kinds_of(bpy.context.scene, [obj])) if "intensity" in text)
     group = obj.patina.colors
     check(said == f"'first_range' is colored by 'intensity', stretched from {group.range_min:,.6g} to {group.range_max:,.6g}", said)
+
+
+def test_first_look_of_cut_off_intensity():
+    """Most intensities are the greatest that the scanner knows, as of the Stanford bunny: no stretch tells them apart, light does. Intensities
+    that are nearly all the least would be black: such points look as points without."""
+    def image(name, intensity, engine='BLENDER_EEVEE'):
+        scene = start_scene()
+        if engine == 'PATINA':
+            scene.render.engine = engine
+        obj, = import_ply(write_ply(name, columns_of(1.0, intensity=intensity)))
+        state = obj.patina.colors.source, obj.patina.lighting
+        bpy.ops.scene.patina_set_up()
+        return scene, obj, state
+
+    def upper(points):
+        return np.where(np.arange(len(points)) % 8, 0.5, 0.27 + 0.2 * np.abs(points[:, 2]))
+
+    scene, obj, _ = image("cut_off.ply", upper)
+    colors = obj.patina.colors
+    check((colors.source, colors.scalar, colors.ramp) == ('SCALAR', "intensity", 'GREY'), f"{colors.source} {colors.ramp}")
+    picture, shown = small_picture(scene)
+    low, middle, high = np.quantile(picture.mean(axis=2)[shown], (0.2, 0.5, 0.8))
+    check(high - low > 0.2 and middle < 0.9, f"gray of {low:.2f}, {middle:.2f}, {high:.2f}")
+    check(obj.patina.lighting == 'LIT' and scene.patina.style.chosen == "plaster", f"{obj.patina.lighting} {scene.patina.style.chosen}")
+    _, _, state = image("cut_off_again.ply", upper, 'PATINA')
+    check(state == ('SCALAR', 'LIT'), f"imported where Patina is the engine: {state}")
+    for name, values in (("lower.ply", lambda points: np.where(np.arange(len(points)) % 4, 0.0, 300 * np.abs(points[:, 2]))),
+                         ("same.ply", lambda points: np.full(len(points), 7.0))):
+        scene, obj, _ = image(name, values)
+        check((obj.patina.colors.source, scene.patina.style.chosen) == ('FIXED', "plaster"), f"{name}: {obj.patina.colors.source}")
+        picture, shown = small_picture(scene)
+        check(np.median(picture[shown]) > 0.2, f"{name}: gray of {np.median(picture[shown]):.2f}")
+
+
+def one_color(name, color, count=8000, **scalars):
+    """A ball whose points all have one color."""
+    points, _, normals = sphere(count, 1.0, (0, 0, 0))
+    rows = [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")] + [(f"n{axis}", "f4", normals[:, i]) for i, axis in enumerate("xyz")]
+    rows += [(channel, "u1", np.full(count, value)) for channel, value in zip(("red", "green", "blue"), color, strict=True)]
+    return write_ply(name, rows + [(scalar, "f4", values(points)) for scalar, values in scalars.items()])
+
+
+def test_first_look_of_one_color():
+    """Points that all have the same color look as points without colors: as plaster, or by their intensity. Beside a colored cloud they are
+    lit in their color. Linked ones too."""
+    for link in (False, True):
+        for color in ((200, 200, 200), (0, 0, 0)):
+            scene = start_scene()
+            obj, = import_ply(one_color(f"one_color_{link}_{color[0]}.ply", color), link=link)
+            bpy.ops.scene.patina_set_up()
+            picture, shown = small_picture(scene)
+            low, high = np.quantile(picture[..., 1][shown], (0.2, 0.8))
+            check(high - low > 0.2, f"linked {link}, {color}: from {low:.2f} to {high:.2f}")
+            check(scene.patina.style.chosen == "plaster", scene.patina.style.chosen)
+        scene = start_scene()
+        obj, = import_ply(one_color(f"one_color_{link}.ply", (90, 90, 90)), link=link)
+        said = set_up.apply(bpy.context, [obj])
+        check("The points have only one color: the style Plaster lights them" in said, f"{said}")
+        scene = start_scene()
+        one, = import_ply(one_color("one_of_two.ply", (220, 40, 40)), link=link)
+        import_ply(write_ply("two_of_two.ply", columns((0, 0, 3))))
+        bpy.ops.scene.patina_set_up()
+        check((one.patina.colors.source, one.patina.lighting, scene.patina.style.chosen) == ('OWN', 'LIT', "scan"), f"linked {link}: {one.patina.lighting}")
+    scene = start_scene()
+    obj, = import_ply(one_color("one_color_intensity.ply", (255, 255, 255), intensity=lambda points: 100 + 50 * points[:, 2]))
+    bpy.ops.scene.patina_set_up()
+    check((obj.patina.colors.source, obj.patina.colors.scalar, obj.patina.lighting) == ('SCALAR', "intensity", 'UNLIT'), obj.patina.colors.source)
+    picture, shown = small_picture(scene)
+    check(np.ptp(picture[..., 0][shown]) > 0.8, "gray by intensity")
+
+
+def test_imports_of_one_color_are_lit():
+    """Where Patina is the engine already: no flat silhouette, linked or not. One point of another color is a color."""
+    for link in (False, True):
+        scene = start_scene()
+        scene.render.engine, bpy.data.lights["Light"].use_shadow = 'PATINA', False  # soft shadows take seconds
+        obj, = import_ply(one_color(f"imported_one_{link}.ply", (200, 200, 200)), link=link)
+        check((obj.patina.colors.source, obj.patina.lighting) == ('OWN', 'LIT'), f"linked {link}: {obj.patina.colors.source} {obj.patina.lighting}")
+        bpy.ops.object.patina_frame_points()
+        picture, shown = small_picture(scene)
+        low, high = np.quantile(picture[..., 1][shown], (0.1, 0.9))
+        check(high - low > 0.05, f"linked {link}: from {low:.2f} to {high:.2f}")
+        obj, = import_ply(one_color(f"imported_black_{link}.ply", (0, 0, 0)), link=link)
+        check(obj.patina.colors.source == 'FIXED', f"black, linked {link}: {obj.patina.colors.source}")
+        points, colors, _ = sphere(3000, 1.0, (0, 0, 0))
+        colors[:], colors[1234, 1] = 200, 210
+        rows = [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")] + [(name, "u1", colors[:, i]) for i, name in enumerate(("red", "green", "blue"))]
+        obj, = import_ply(write_ply(f"imported_two_{link}.ply", rows), link=link)
+        check(obj.patina.lighting == 'AUTO', f"two colors, linked {link}: {obj.patina.lighting}")
 
 
 def test_first_look_of_classes():

@@ -144,6 +144,14 @@ def colored(rgb: np.ndarray) -> np.ndarray:
     return (rgb[:, :3] > 0).any(axis=1) & ~np.isnan(rgb[:, :3]).any(axis=1)
 
 
+def constant(rgb: np.ndarray) -> np.ndarray | None:
+    """(3,): the color that all points share. None: there are several, or no numbers."""
+    first = rgb[0, :3] if len(rgb) else None
+    if first is None or (rgb[::max(1, len(rgb) // 1000), :3] != first).any() or (rgb[:, :3] != first).any():
+        return None
+    return first.copy()
+
+
 def without_uncolored(values: np.ndarray | None, rgb: np.ndarray | None) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Opacities that leave out points without a color, and the colors. Where no point has one, nobody is left out: the cloud has no colors."""
     has = None if rgb is None else colored(rgb)
