@@ -12,7 +12,7 @@ from bpy.types import Object, Scene
 
 from .. import jobs, native, point_data
 from ..sync.points import attributes, coloring, linked
-from . import view_transform
+from . import add_light, view_transform
 
 PLASTER = "plaster"  # the style of points that have positions alone
 FLAT = 0.1  # of the stretched intensity: where the middle half of the points spans less, they look alike without light
@@ -159,11 +159,11 @@ def _light_one_color(obj: Object, frame: int) -> str:
 
 
 def color_imported(obj: Object, frame: int) -> str:
-    """Shows new points in their intensity if they have no colors and nobody has chosen a look, and lights those of one color. Returns what
-    was done, or ""."""
+    """Shows new points in their intensity if they have no colors and nobody has chosen a look. Lights those of one color, unless they would be
+    black in the scene. Returns what was done, or ""."""
     if obj.patina.colors.source != 'OWN':
         return ""
     kind = _data(obj, frame)
     if kind == Data.INTENSITY:
         return _show_intensity(obj, frame)
-    return "" if kind == Data.COLORS else _light_one_color(obj, frame)
+    return "" if kind == Data.COLORS or add_light.is_dark(bpy.context.scene) else _light_one_color(obj, frame)

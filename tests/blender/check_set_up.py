@@ -311,6 +311,10 @@ def test_imports_of_one_color_are_lit():
         picture, shown = small_picture(scene)
         low, high = np.quantile(picture[..., 1][shown], (0.1, 0.9))
         check(high - low > 0.05, f"linked {link}: from {low:.2f} to {high:.2f}")
+        scene.objects["Light"].hide_render, world, scene.world = True, scene.world, None
+        obj, = import_ply(one_color(f"imported_dark_{link}.ply", (200, 200, 200)), link=link)
+        check(obj.patina.lighting == 'AUTO', f"no light, linked {link}: {obj.patina.lighting}")
+        scene.world = world
         obj, = import_ply(one_color(f"imported_black_{link}.ply", (0, 0, 0)), link=link)
         check(obj.patina.colors.source == 'FIXED', f"black, linked {link}: {obj.patina.colors.source}")
         points, colors, _ = sphere(3000, 1.0, (0, 0, 0))
