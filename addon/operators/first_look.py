@@ -34,9 +34,7 @@ def data_of(obj: Object, frame: int) -> Data:
     not. Linked files are asked for colors alone. PatinaError if a linked file cannot be read."""
     if obj.patina.linked_file:
         found = _cloud_of(obj, frame)
-        if not found or found.has_colors and one_color(obj, frame) is None:
-            return Data.COLORS
-        return Data.POSITIONS
+        return Data.COLORS if not found or found.has_colors and _shared(found) is None else Data.POSITIONS
     with attributes.readable(obj) as data:
         count = point_data.count_of(data)
         rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
@@ -54,7 +52,7 @@ def one_color(obj: Object, frame: int) -> np.ndarray | None:
     have none, or several. PatinaError if a linked file cannot be read."""
     if obj.patina.linked_file:
         found = _cloud_of(obj, frame)
-        return attributes.constant(found.thinned(min(SAMPLED, found.count))[1]) if found and found.has_colors and found.count else None
+        return _shared(found) if found else None
     with attributes.readable(obj) as data:
         count = point_data.count_of(data)
         rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
@@ -64,6 +62,11 @@ def one_color(obj: Object, frame: int) -> np.ndarray | None:
 def _cloud_of(obj: Object, frame: int) -> native.Cloud | None:
     source = linked.source_of(obj, frame, [])
     return source and jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
+
+
+def _shared(cloud: native.Cloud) -> np.ndarray | None:
+    """The color of all points of a cloud, as far as some are compared. None: they have none, or several."""
+    return attributes.constant(cloud.thinned(min(SAMPLED, cloud.count))[1]) if cloud.has_colors and cloud.count else None
 
 
 def _intensities(data: bpy.types.ID, count: int) -> tuple[float, float] | None:
@@ -114,7 +117,7 @@ def choose(scene: Scene, found: Mapping[Object, Data]) -> list[str]:
             coloring.apply(obj, coloring.Choice("Class", 'SCALAR', name, 'CLASSES'), frame)
             said.append(f"'{obj.name}' is colored by its classes")
         elif kind == Data.POSITIONS and not plaster:
-            said += filter(None, [_light_one_color(obj, frame)])
+            said += filter(None, [_light_one_color(obj, one_color(obj, frame))])
     if not plaster and any(kind != Data.POSITIONS for kind in kinds.values()) and view_transform.changes_colors(scene):
         bpy.ops.render.patina_true_colors()
         said.append("The view transform is Standard, which shows the colors as they were taken")
@@ -146,9 +149,9 @@ def _show_intensity(obj: Object, frame: int) -> str:
     return f"'{obj.name}' is colored by '{name}'{stretched}{lit}"
 
 
-def _light_one_color(obj: Object, frame: int) -> str:
-    """Lights points that have one color alone, which shows no form without light. Black ones become as points without colors."""
-    color = one_color(obj, frame)
+def _light_one_color(obj: Object, color: np.ndarray | None) -> str:
+    """Lights points that have one color alone, which shows no form without light. Black ones become as points without colors. Returns what
+    was done, or ""."""
     if color is None:
         return ""
     if not attributes.colored(color[None]).any():
@@ -158,12 +161,14 @@ def _light_one_color(obj: Object, frame: int) -> str:
     return f"The points of '{obj.name}' have only one color, and are lit"
 
 
-def color_imported(obj: Object, frame: int) -> str:
+def color_imported(obj: Object, frame: int, cloud: native.Cloud | None = None) -> str:
     """Shows new points in their intensity if they have no colors and nobody has chosen a look. Lights those of one color, unless they would be
-    black in the scene. Returns what was done, or ""."""
+    black in the scene. cloud: of a linked file. Returns what was done, or ""."""
     if obj.patina.colors.source != 'OWN':
         return ""
-    kind = _data(obj, frame)
+    kind = Data.POSITIONS if cloud else _data(obj, frame)
     if kind == Data.INTENSITY:
         return _show_intensity(obj, frame)
-    return "" if kind == Data.COLORS or add_light.is_dark(bpy.context.scene) else _light_one_color(obj, frame)
+    if kind == Data.COLORS or add_light.is_dark(bpy.context.scene):
+        return ""
+    return _light_one_color(obj, _shared(cloud) if cloud else one_color(obj, frame))

@@ -206,10 +206,10 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         obj.select_set(True)
         context.view_layer.objects.active = obj
 
-    def _color(self, context: Context, obj: bpy.types.Object) -> None:
-        """The first look of new points; with another engine, Set Up chooses it."""
+    def _color(self, context: Context, obj: bpy.types.Object, cloud: native.Cloud | None = None) -> None:
+        """The first look of new points; with another engine, Set Up chooses it. cloud: of a linked file."""
         if context.engine == set_up.PatinaRenderEngine.bl_idname:
-            if said := first_look.color_imported(obj, context.scene.frame_current):
+            if said := first_look.color_imported(obj, context.scene.frame_current, cloud):
                 self.report({'INFO'}, told(f"Patina: {said}"))
 
     def _finish(self, context: Context) -> None:
@@ -253,7 +253,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             obj.patina.stream = self.stream
             self._add(context, obj, item.origin, item.units)
             if not self.sequence and not item.cloud.stream:
-                self._color(context, obj)
+                self._color(context, obj, item.cloud)
         self._finish(context)
         count = sum(item.cloud.count for item in found.values())
         self.report({'INFO'}, f"Linked {count:,} point{'s' * (count != 1)}. {_told_next(context)}")
