@@ -38,6 +38,9 @@ def test_borders_of_regions_and_tiles():
                 cli.run("render", "wide.cloud", "-o", names[-1], *VIEW, *options, "--tiles", tiles, "--tile", number)
             cli.run("merge", *names, "-o", "joined.png")
             assert cli.read_png("joined.png")[3] == whole, f"{kind}: {tiles}"
+        for rows in (7, 33):
+            cli.run("render", "wide.cloud", "-o", "strips.png", *VIEW, *options, "--strip", rows)
+            assert (cli.FOLDER / "strips.png").read_bytes() == (cli.FOLDER / "whole.png").read_bytes(), f"{kind}: strips of {rows} rows"
 
 
 def test_linked_chunks_reach_beyond_their_centers():
