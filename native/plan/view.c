@@ -732,7 +732,7 @@ static int plan_view(const struct patina_scene *scene, struct pt_plan *plan, str
     set_view(&survey->camera, &plan->view);
     pt_choose_window(scene, plan, guard);
     if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "planes of %u x %u pixels are too large: render in regions",
+        return pt_fail(&scene->handle, PATINA_ERROR_TOO_LARGE, "planes of %u x %u pixels are too large: render in regions",
                        plan->view.width, plan->view.height);
     for (uint32_t i = 0; i < scene->cloud_count && !error; i++)
         error = place_instance(scene, plan, survey, i);

@@ -184,7 +184,7 @@ int pt_frame_check(struct patina_frame *frame, const struct patina_scene *scene)
     struct pt_plan plan;
     int error = pt_plan_create(scene, NULL, &plan); // another frame may be drawn by the device's threads meanwhile
     if (error)
-        return error;
+        return pt_fail_again(&frame->handle, error);
     error = pt_frame_share_planes(frame, &plan);
     error = error ? pt_fail(NULL, error, "planning the frame: out of memory")
                   : pt_planes_check(frame->device, &frame->planes, &plan);

@@ -260,8 +260,10 @@ static int try_region(struct job *job, const uint32_t region[4], double *ms)
     patina_settings settings = job->options.settings;
     memcpy(settings.region, region, sizeof settings.region);
     int code = patina_scene_set_settings(job->scene, &settings);
-    if (!code && job->options.output && !(job->pixels = malloc(size))) // before any work is done
-        code = PATINA_ERROR_TOO_LARGE;
+    if (!code && job->options.output && !(job->pixels = malloc(size))) { // before any work is done
+        code = patina_frame_check(job->frame, job->scene);               // whose message has figures
+        code = code ? code : PATINA_ERROR_TOO_LARGE;
+    }
     if (!code && job->options.planes)
         code = patina_frame_keep_planes(job->frame, 1);
     if (!code && job->parts->count)

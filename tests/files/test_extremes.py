@@ -70,9 +70,10 @@ def some():
 
 def test_too_large_for_the_memory():
     """16384 x 16384 with 2 GB, of points so far apart that strips do not help, and more pixels than a plane has: statistics
-    are of whole images, which are not drawn in strips."""
+    are of whole images, which are not drawn in strips. The message is about the whole image, not about the last strip that was tried."""
     refused(patina("render", some(), "-o", "x.png", "--size", "16384x16384", *FLAT, memory=2 * GIGA), "render it in regions")
-    refused(patina("render", some(), "-o", "x.png", "--size", "65536x65536", "--stats", "json", *FLAT), "too large")
+    for more in (("--stats", "json"), ()):
+        refused(patina("render", some(), "-o", "x.png", "--size", "65536x65536", *FLAT, *more, memory=4 * GIGA), "pixels are too large: render in regions")
     assert not (SCRATCH / "x.png").exists()
 
 
@@ -96,11 +97,15 @@ def test_strips_where_memory_lacks():
 
 
 def test_narrow():
-    for size in ("65535x1", "1x65535"):
-        code, _, said, _, _ = patina("render", some(), "-o", "narrow.png", "--size", size, "--look", "0.5,0.5,3,0.5,0.501,0,40", *FLAT)
-        assert code == 0, said
-        width, height, drawn = size_of("narrow.png")
-        assert f"{width}x{height}" == size and drawn, (width, height, drawn)
+    narrow("65535x1", "0.5,0.5,3,0.5,0.501,0,40")
+    narrow("1x65535", "0.5,0.5,3,0.5,0.501,0,40")
+
+
+def narrow(size, look, *more):
+    code, _, said, _, _ = patina("render", some(), "-o", "narrow.png", "--size", size, "--look", look, *FLAT, *more)
+    assert code == 0, said
+    width, height, drawn = size_of("narrow.png")
+    assert f"{width}x{height}" == size and drawn, (width, height, drawn)
 
 
 def test_layers_in_one_pixel():
@@ -152,9 +157,7 @@ def test_large_light_maps():
     code, _, said, _, _ = patina("render", *view, "--device", "cpu")
     assert code == 0, said
     (SCRATCH / "map.png").unlink()
-    code, _, said, _, _ = patina("render", some(), "-o", "small.png", "--size", "64x64", "--device", "gl-egl", *FLAT)
-    if code:
-        raise Skip(f"there is no OpenGL device here: {said.strip()}")
+    needs_opengl()
     result = patina("render", *view, "--device", "gl-egl")
     if result[0]:
         refused(result, "lower the shadow resolution")
@@ -182,19 +185,32 @@ def test_soft_points_in_one_pixel():
         assert "MB are the most that its driver allows" in said and not (SCRATCH / "balls.png").exists(), said
 
 
-def test_small_blocks():
-    """4096 x 4096 on OpenGL, where shaders may reach no more than 128 MiB of a plane, as in Mesa's software: strips give an image. Where points
-    are so far apart that no strip does, one message says so."""
+def needs_opengl():
     code, _, said, _, _ = patina("render", some(), "-o", "small.png", "--size", "64x64", "--device", "gl-egl", *FLAT)
     if code:
         raise Skip(f"there is no OpenGL device here: {said.strip()}")
+
+
+def test_small_blocks():
+    """4096 x 4096 on OpenGL, where shaders may reach no more than 128 MiB of a plane, as in Mesa's software: strips give an image. Where points
+    are so far apart that no strip does, at this size or at 16384 x 16384, one message says so."""
+    needs_opengl()
     code, _, said, _, _ = patina("render", some(), "-o", "blocks.png", "--size", "4096x4096", "--device", "gl-egl", *CLOSE, *FLAT)
     assert code == 0 and size_of("blocks.png") == (4096, 4096, True), said
-    result = patina("render", some(), "-o", "sparse.png", "--size", "4096x4096", "--device", "gl-egl", *FLAT)
-    if result[0] == 0:
-        assert size_of("sparse.png") == (4096, 4096, True)
-    else:
-        refused(result, "render it in regions")
+    for side in (4096, 16384):
+        (SCRATCH / "sparse.png").unlink(missing_ok=True)
+        result = patina("render", some(), "-o", "sparse.png", "--size", f"{side}x{side}", "--device", "gl-egl", *FLAT)
+        if result[0] == 0:
+            assert size_of("sparse.png") == (side, side, True)
+        else:
+            refused(result, f"a {side} x {side} image needs")
+            assert result[2].strip().endswith("render it in regions") and not (SCRATCH / "sparse.png").exists(), result[2]
+
+
+def test_narrow_on_opengl():
+    needs_opengl()
+    narrow("65535x1", "0.5,0.5,3,0.5,0.501,0,40", "--device", "gl-egl")
+    narrow("1x65535", "0.5,0.5,3,0.5,0.501,0", "--ortho", "0.02", "--device", "gl-egl")  # in which points lie close together: margins are small
 
 
 if __name__ == "__main__":

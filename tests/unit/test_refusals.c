@@ -219,13 +219,21 @@ static void test_bad_lights_and_shadows(void **state)
     clear_stage(&stage);
 }
 
+// A plane has fewer than 2^29 pixels. A larger one has the code of images that memory lacks for, so that callers draw regions.
 static void test_planes_too_large(void **state)
 {
     (void)state;
     struct stage stage = set_stage(0);
-    set_size(stage.scene, 65536, 8300);
-    assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_ARGUMENT);
-    assert_message(stage.frame, "regions");
+    static const uint32_t sizes[][2] = {{65536, 8300}, {32768, 32768}, {65536, 65536}};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        set_size(stage.scene, sizes[i][0], sizes[i][1]);
+        assert_int_equal(patina_frame_check(stage.frame, stage.scene), PATINA_ERROR_TOO_LARGE);
+        assert_message(stage.frame, "pixels are too large: render in regions");
+        assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_TOO_LARGE);
+        assert_message(stage.frame, "pixels are too large: render in regions");
+        set_size(stage.scene, SIDE, SIDE);
+        assert_int_equal(patina_frame_check(stage.frame, stage.scene), PATINA_OK);
+    }
     patina_settings part = {.struct_size = sizeof part, .width = 65536, .height = 8300, .region = {32000, 4000, 32100, 4100}};
     assert_int_equal(patina_scene_set_settings(stage.scene, &part), PATINA_OK);
     assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
