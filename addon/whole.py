@@ -45,6 +45,16 @@ def _hold(file: BinaryIO, path: Path, unknown: bool = True) -> bool:
     return False
 
 
+def _empty(folder: Path) -> None:
+    """Deletes what a folder holds, except its lock. The lock goes last: a process that is killed meanwhile leaves a folder that the next one knows
+    as left over. OSError."""
+    for item in folder.iterdir():
+        if item.is_dir() and not item.is_symlink():
+            shutil.rmtree(item)
+        elif item.name != _LOCK:
+            item.unlink()
+
+
 def _remove_unheld(path: Path, tree: Path | None = None) -> bool:
     """Deletes a file, and a folder that it is the lock of, unless somebody holds it."""
     try:
@@ -52,6 +62,8 @@ def _remove_unheld(path: Path, tree: Path | None = None) -> bool:
             if not _hold(file, path, time.time() - os.fstat(file.fileno()).st_mtime > _OLD):
                 return False
             if fcntl is not None:  # while we hold it, for its name may be taken again
+                if tree:
+                    _empty(tree)
                 path.unlink()
         if fcntl is None:
             path.unlink()  # fails where somebody has it open
@@ -129,6 +141,8 @@ class Folder:
         self.path.mkdir()
 
     def cleanup(self) -> None:
+        with contextlib.suppress(OSError):
+            _empty(Path(self._folder.name))
         self._lock.close()
         self._folder.cleanup()
 

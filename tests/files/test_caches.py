@@ -308,6 +308,51 @@ def test_whole_files_of_others_stay():
     assert sorted(item.name for item in folder.iterdir()) == ["a.cloud.part2", "film.mkv.part"]
 
 
+DELETER = """
+import importlib.util, os, sys
+spec = importlib.util.spec_from_file_location("whole", sys.argv[1])
+whole = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(whole)
+from pathlib import Path
+place, who, left = Path(sys.argv[2]), sys.argv[3], int(sys.argv[4])
+
+def dies(delete):
+    def counted(*arguments, **options):
+        global left
+        left -= 1
+        if left < 0:
+            os._exit(9)
+        return delete(*arguments, **options)
+    return counted
+
+made = whole.Folder("patina-test-", place)
+(made.path / "x").write_bytes(b"1")
+(made.path / "y").mkdir()
+if who == "next":
+    os.close(made._lock.fileno())  # as if this process had been killed
+    made._folder._finalizer.detach()
+os.unlink, os.rmdir = dies(os.unlink), dies(os.rmdir)
+made.cleanup() if who == "owner" else whole.remove_left_folders(place, "patina-test-")
+os._exit(0)
+"""
+
+
+def test_folders_killed_while_they_go():
+    """At each deletion, of the folder's owner, and of the next process that removes the folder: what is then left over goes at once."""
+    folder, script = SCRATCH / "going", SCRATCH / "deleter.py"
+    folder.mkdir()
+    script.write_text(DELETER)
+    for who in ("owner", "next"):
+        codes = []
+        while not codes or codes[-1]:
+            done = subprocess.run([sys.executable, "-I", script, whole.__file__, folder, who, str(len(codes))], check=False)
+            codes.append(done.returncode)
+            assert codes[-1] in (0, 9) and len(codes) < 20, codes
+            whole.remove_left_folders(folder, "patina-test-")
+            assert not list(folder.iterdir()), f"{who}, killed at deletion {len(codes)}: {sorted(folder.rglob('*'))}"
+        assert len(codes) > 4, codes
+
+
 def test_failed_writing_leaves_the_file():
     path = SCRATCH / "failed"
     path.write_bytes(b"before")
