@@ -742,7 +742,8 @@ PATINA_API void patina_frame_destroy(patina_frame *frame);
 // Renders; blocks. On any error the last good picture stays readable.
 PATINA_API int patina_frame_render(patina_frame *frame, const patina_scene *scene);
 // Plans without rendering, and returns PATINA_ERROR_TOO_LARGE where patina_frame_render would refuse the image before it begins: a plane
-// is larger than the device's buffers, or all of them are larger than memory_cap or the memory that is free. A smaller region may do.
+// has 2^29 pixels or more, or is larger than the device's buffers, or all of them are larger than memory_cap or the memory that is free.
+// A smaller region may do.
 // The same of the maps of lights, which a lower shadow_resolution makes smaller. What kernels keep beside their buffers is not counted.
 PATINA_API int patina_frame_check(patina_frame *frame, const patina_scene *scene);
 // Betters the picture that patina_frame_render made with settings.pixel_progressive, by a step: with shadow_progressive the next
