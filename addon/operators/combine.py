@@ -95,7 +95,7 @@ def _points_scene(scene: Scene) -> Scene:
     if bpy.app.version < (5, 0, 0):
         points.use_nodes = False
     else:
-        points.compositing_node_group = None
+        combination.set_tree(points, None)
     return points
 
 

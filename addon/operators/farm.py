@@ -15,6 +15,7 @@ from bpy.types import Context, Operator, Scene
 
 from ..draw.engine import PatinaRenderEngine
 from ..sync.points import files, linked, sequence
+from ..sync.view import combination
 
 MOVIES = {'FFMPEG', 'AVI_JPEG', 'AVI_RAW'}
 PLAIN = {'R_LAYERS', 'COMPOSITE', 'GROUP_OUTPUT', 'GROUP_INPUT', 'VIEWER'}  # nodes that change no pixel
@@ -111,8 +112,7 @@ def _check_tiles(scene: Scene, tiles: tuple[int, int]) -> None:
         raise Refused("tiles make a picture without passes: choose another image format than multilayer EXR")
     if render.use_multiview:
         raise Refused("tiles make a picture for one eye: switch off Stereoscopy")
-    nodes = scene.compositing_node_group if hasattr(scene, "compositing_node_group") else scene.use_nodes and scene.node_tree  # from 5.0 on; before
-    if render.use_compositing and nodes and any(node.type not in PLAIN for node in nodes.nodes):
+    if render.use_compositing and any(node.type not in PLAIN for tree in combination.trees_of(scene) for node in tree.nodes):
         raise Refused("compositing looks at the whole picture: composite the merged one")
     if scene.render.engine == PatinaRenderEngine.bl_idname and scene.patina.noise > 0.0:
         raise Refused("a noise threshold ends at other samples in each tile: switch it off")

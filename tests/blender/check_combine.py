@@ -7,7 +7,7 @@ import tempfile
 import bpy
 import numpy as np
 from harness import add_points, check, check_close, new_scene, reports
-from patina.sync.view import pairs
+from patina.sync.view import combination, pairs
 
 
 def crossing():
@@ -211,7 +211,7 @@ def test_scene_of_points_deleted():
         check(len(said) == 1 and "without points" in said[0] and scene.name in said[0], f"{said}")
         bpy.ops.scene.patina_combine(engine='CYCLES')
         bpy.ops.scene.patina_combine(engine='CYCLES')
-        tree = scene.node_tree if bpy.app.version < (5, 0, 0) else scene.compositing_node_group
+        tree, = combination.trees_of(scene)
         tree.nodes.new('CompositorNodeRLayers').scene = bpy.data.scenes.new("another")
         bpy.data.scenes.remove(bpy.data.scenes["another"])
         check_close(picture(scene), both, 1e-6, "combined again")

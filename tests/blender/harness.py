@@ -63,6 +63,7 @@ patina = load_addon()
 from patina import point_data  # noqa: E402
 from patina.draw import engine, passes  # noqa: E402
 from patina.sync.points import attributes  # noqa: E402
+from patina.sync.view import combination  # noqa: E402
 
 reports: list[tuple[str, str]] = []  # (kind, message) of the last render
 stats: list[str] = []
@@ -207,8 +208,9 @@ def move(obj, index, place):
 
 def compositor(scene):
     """The tree of a new compositor, and its output node. Blender 5 has node groups for it, older versions the scene's own tree."""
-    if hasattr(scene, "compositing_node_group"):
-        tree = scene.compositing_node_group = bpy.data.node_groups.new("compositor", 'CompositorNodeTree')
+    if bpy.app.version >= (5, 0, 0):
+        tree = bpy.data.node_groups.new("compositor", 'CompositorNodeTree')
+        combination.set_tree(scene, tree)
         tree.interface.new_socket("Image", in_out='OUTPUT', socket_type='NodeSocketColor')
         return tree, tree.nodes.new('NodeGroupOutput')
     scene.use_nodes = True
@@ -217,8 +219,8 @@ def compositor(scene):
 
 
 def end_compositor(scene):
-    if hasattr(scene, "compositing_node_group"):
-        scene.compositing_node_group = None
+    if bpy.app.version >= (5, 0, 0):
+        combination.set_tree(scene, None)
     else:
         scene.use_nodes = False
 

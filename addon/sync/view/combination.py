@@ -11,17 +11,27 @@ _UNDER, _OVER = f"{NODE}: under", f"{NODE}: over"
 _BELOW = 1 if bpy.app.version < (5, 0, 0) else 0  # input of Alpha Over; before it was the factor, 1
 
 
-def tree_of(scene: Scene) -> NodeTree | None:
-    """The scene's compositor tree, if it has one and uses it."""
-    if bpy.app.version < (5, 0, 0):
-        return scene.node_tree if scene.use_nodes else None
-    return scene.compositing_node_group
+def trees_of(scene: Scene) -> list[NodeTree]:
+    """The compositor trees that the scene uses. From Blender 5.3 on it may have several, one for each effect."""
+    if bpy.app.version >= (5, 3, 0):
+        return [effect.node_group for effect in scene.compositor_effects if effect.node_group and effect.enable_for_render]
+    tree = scene.compositing_node_group if bpy.app.version >= (5, 0, 0) else scene.use_nodes and scene.node_tree
+    return [tree] if tree else []
+
+
+def set_tree(scene: Scene, tree: NodeTree | None) -> None:
+    """Makes a node group the scene's only compositor tree, from Blender 5.0 on. None: the scene has no tree then."""
+    if bpy.app.version < (5, 3, 0):
+        scene.compositing_node_group = tree
+        return
+    scene.compositor_effects.clear()
+    if tree:
+        scene.compositor_effects.new(name=tree.name).node_group = tree
 
 
 def hand_over(scene: Scene, old: Scene, points: Scene) -> None:
     """What came from the old scene of points comes from the new one."""
-    tree = tree_of(scene)
-    for node in tree.nodes if tree else ():
+    for node in (node for tree in trees_of(scene) for node in tree.nodes):
         if node.type == 'R_LAYERS' and node.scene == old:
             node.scene = points
 
@@ -29,8 +39,8 @@ def hand_over(scene: Scene, old: Scene, points: Scene) -> None:
 def take_out(scene: Scene) -> bool:
     """Where the scene of points is gone, its nodes go too, and the output gets what went into the combination: else the picture would
     be empty. Whether that was so."""
-    tree = tree_of(scene)
-    under = tree.nodes.get(_UNDER) if tree and scene.library is None else None
+    tree = next((tree for tree in trees_of(scene) if _UNDER in tree.nodes), None)
+    under = tree.nodes[_UNDER] if tree and scene.library is None else None
     if under is None or NODE not in tree.nodes:
         return False
     gone = {link.from_node for link in under.inputs[_BELOW].links}
@@ -50,11 +60,13 @@ def _made_tree(scene: Scene) -> NodeTree:
     if bpy.app.version < (5, 0, 0):
         scene.use_nodes = True
         return scene.node_tree
-    if scene.compositing_node_group is None:
+    trees = trees_of(scene)
+    if not trees:
         tree = bpy.data.node_groups.new(f"{scene.name} Compositor", 'CompositorNodeTree')
         tree.interface.new_socket("Image", in_out='OUTPUT', socket_type='NodeSocketColor')
-        scene.compositing_node_group = tree
-    return scene.compositing_node_group
+        set_tree(scene, tree)
+        return tree
+    return trees[-1]
 
 
 def _output(tree: NodeTree) -> NodeSocket:
