@@ -127,15 +127,17 @@ def library_of_wheel(path, data, name):
         return wheel.read(f"patina_library/{name}")
 
 
-def validator():
-    """Of Blender's extensions, in a newer Blender's module; None where there is none."""
-    found = sorted((ROOT / "build/out").glob("bpy*/lib/python3*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
-    return found[-1] if found else None
+def validators():
+    """{Blender: its own validator of extensions}, of the Blenders that are here as modules."""
+    found = (ROOT / "build/out").glob("bpy*/lib/python3*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
+    return {path.parents[4].name: path for path in sorted(found)}
 
 
 def validate(path):
-    done = subprocess.run([sys.executable, validator(), "validate", path], capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "error" not in (done.stdout + done.stderr).lower(), done.stdout + done.stderr
+    for blender, validator in validators().items():
+        done = subprocess.run([sys.executable, validator, "validate", path], capture_output=True, text=True, check=False)
+        said = done.stdout + done.stderr
+        assert done.returncode == 0 and "error" not in said.lower(), f"Blender {blender}: {said}"
 
 
 def check_sources(data, library):
@@ -190,7 +192,7 @@ def check(platform, path):
     newest = max((tuple(map(int, name.removeprefix("GLIBC_").split("."))) for name in needed if name.startswith("GLIBC_")), default=())
     assert newest <= GLIBC, newest
     assert path.stat().st_size < 12e6, f"{path.stat().st_size / 1e6:.2f} MB"
-    if not legacy and validator():
+    if not legacy:
         validate(path)
     if system == "macos":
         assert "macOS 11.0" in needed and (processor == "x64" or "a signature" in needed), needed  # Intel's Macs take what is not signed
@@ -200,9 +202,10 @@ def check(platform, path):
 
 def main():
     passed = failed = skipped = 0
-    if not validator():
+    print(f"validators of Blender {', '.join(validators()) or '–'}")
+    if not validators():
         skipped = 1
-        print("skip validator: build/out/bpy42, bpy45 and bpy50 are not there, which bring it")
+        print("skip validator: build/out/bpy42, bpy45, bpy50, bpy51 and bpy53 are not there, which bring it")
     for path in sorted(FOLDER.glob("patina-*.zip")):
         platform = re.search(r"(linux|windows|macos)-(x64|arm64)", path.stem).group()
         try:
