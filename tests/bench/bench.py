@@ -22,7 +22,7 @@ scans against exact views; half an hour more where these are not kept yet), inde
 on the disk), walk (frame by frame
 through virtual scans), ranges (range images beside [K Tables I, II], and beside filling and discs), soft (soft points in the sizes
 of [S Table 1], its models and orders, and against OSPRay), platforms (Blender's start with the add-on, sizes of packages, instructions of NEON's inner
-loops). With --quick they take a million points, and one
+loops), first (a newcomer's wait from the package to the first image). With --quick they take a million points, and one
 minute. Two are of --only alone, for they need what most machines lack: gpu (frames of OpenGL, pass by pass, beside the processor) and
 scaling (threads up to all cores).
 """
@@ -42,6 +42,7 @@ import analysis
 import case as cases
 import cues
 import files
+import first_image
 import gpu
 import imports
 import instructions
@@ -74,7 +75,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "frames", "leaves", "scans", "independent", "session", "analysis", "files", "walk", "ranges", "soft", "platforms", "gpu", "scaling")
+          "frames", "leaves", "scans", "independent", "session", "analysis", "files", "walk", "ranges", "soft", "platforms", "first", "gpu", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -225,6 +226,8 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
     "normals": ("analysis", "Normals of known shapes", lambda options: analysis.normals(options.library)),
     "walk": ("walk", "Walks through virtual scans", lambda options: walk.text(options.quick, options.library)),
     "start": ("platforms", "Blender's start, and the packages", lambda options: start.measure(3 if options.quick else 9)),
+    "first": ("first", "From the zip to the first image",
+              lambda options: first_image.measure(*((1, 100_000) if options.quick else (3, 1_000_000)))),
     "instructions": ("platforms", "Instructions of inner loops, NEON's against AVX2's",
                      lambda options: instructions.table(options.library.parent, ROOT / "build/out/linux-arm64")),
     "soft points": ("soft", "[S Table 1]: frames a second on a GTX 1080 → ours", lambda options: soft_points.text(options.quick, options.library)),
