@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 
 import bpy
@@ -29,44 +30,43 @@ class Data(Enum):
     POSITIONS = "positions"
 
 
-def data_of(obj: Object, frame: int) -> Data:
+@dataclass(frozen=True)
+class Found:
+    """What the points of an object have."""
+
+    kind: Data
+    flat: bool = False  # most have nearly the same intensity, which no stretch tells apart: scanners cut off what is too bright for them
+    color: np.ndarray | None = None  # that all have, or that all of many points of a linked cloud have: sRGB bytes or linear floats
+
+
+def data_of(obj: Object, frame: int) -> Found:
     """What the points of an object have that tells them apart: one color alone, or an intensity that would be black nearly everywhere, does
     not. Linked files are asked for colors alone. PatinaError if a linked file cannot be read."""
     if obj.patina.linked_file:
-        found = _cloud_of(obj, frame)
-        return Data.COLORS if not found or found.has_colors and _shared(found) is None else Data.POSITIONS
+        cloud = _cloud_of(obj, frame)
+        return _of_cloud(cloud) if cloud else Found(Data.COLORS)
     with attributes.readable(obj) as data:
         count = point_data.count_of(data)
         rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
-        if rgb is not None and attributes.constant(rgb) is None and attributes.colored(rgb).any():
-            return Data.COLORS
+        color = None if rgb is None else attributes.constant(rgb)
+        if rgb is not None and color is None and attributes.colored(rgb).any():
+            return Found(Data.COLORS)
         spread = _intensities(data, count)
         if spread and (spread[1] >= FLAT or spread[0] >= BRIGHT):
-            return Data.INTENSITY
+            return Found(Data.INTENSITY, spread[1] < FLAT, color)
         classes = attributes.classes(data, count, obj.patina.colors.class_attribute) if count else None
-        return Data.CLASSES if classes is not None and classes.any() else Data.POSITIONS
+        return Found(Data.CLASSES if classes is not None and classes.any() else Data.POSITIONS, color=color)
 
 
-def one_color(obj: Object, frame: int) -> np.ndarray | None:
-    """The color that all points of an object have, or that all of many points of a linked one have: sRGB bytes or linear floats. None: they
-    have none, or several. PatinaError if a linked file cannot be read."""
-    if obj.patina.linked_file:
-        found = _cloud_of(obj, frame)
-        return _shared(found) if found else None
-    with attributes.readable(obj) as data:
-        count = point_data.count_of(data)
-        rgb = attributes.colors(data, count, obj.patina.color_attribute) if count else None
-        return None if rgb is None else attributes.constant(rgb)
+def _of_cloud(cloud: native.Cloud) -> Found:
+    """What a linked cloud has. Its intensity and classes are not asked for."""
+    color = attributes.constant(cloud.thinned(min(SAMPLED, cloud.count))[1]) if cloud.has_colors and cloud.count else None
+    return Found(Data.COLORS if cloud.has_colors and color is None else Data.POSITIONS, color=color)
 
 
 def _cloud_of(obj: Object, frame: int) -> native.Cloud | None:
     source = linked.source_of(obj, frame, [])
     return source and jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
-
-
-def _shared(cloud: native.Cloud) -> np.ndarray | None:
-    """The color of all points of a cloud, as far as some are compared. None: they have none, or several."""
-    return attributes.constant(cloud.thinned(min(SAMPLED, cloud.count))[1]) if cloud.has_colors and cloud.count else None
 
 
 def _intensities(data: bpy.types.ID, count: int) -> tuple[float, float] | None:
@@ -82,7 +82,7 @@ def _intensities(data: bpy.types.ID, count: int) -> tuple[float, float] | None:
     return ((median - low) / (high - low), (last - first) / (high - low)) if low < high else None
 
 
-def kinds_of(scene: Scene, points: Sequence[Object]) -> dict[Object, Data]:
+def found_in(scene: Scene, points: Sequence[Object]) -> dict[Object, Found]:
     """What each object has. Colors, where a file cannot be read."""
     return {obj: _data(obj, scene.frame_current) for obj in points}
 
@@ -93,54 +93,46 @@ def is_lit(obj: Object, kind: Data) -> bool:
     return patina.lighting == 'LIT' or patina.lighting == 'AUTO' and not (patina.colors.source in {'OWN', 'MATERIAL'} and kind == Data.COLORS)
 
 
-def choose(scene: Scene, found: Mapping[Object, Data]) -> list[str]:
+def choose(scene: Scene, found: Mapping[Object, Found]) -> list[str]:
     """Sets the look of points whose look nobody has chosen yet. Returns what was done, in sentences without full stops.
 
     Colors are shown unlit and as they were taken. Intensity is stretched between its 1st and 99th percentile, and lit where most points have
     nearly the same. Classes get the LAS colors. If light shows the form of all objects, the scene gets the style Plaster."""
     frame = scene.frame_current
-    kinds = {obj: kind for obj, kind in found.items() if obj.patina.colors.source == 'OWN'}
-    flat = {obj for obj, kind in kinds.items() if kind == Data.INTENSITY and _is_flat(obj)}
+    chosen = {obj: each for obj, each in found.items() if obj.patina.colors.source == 'OWN'}
     said = []
-    plaster = bool(kinds) and all(kind == Data.POSITIONS or obj in flat for obj, kind in kinds.items())
+    plaster = bool(chosen) and all(each.kind == Data.POSITIONS or each.flat for each in chosen.values())
     if plaster:
-        what = "no colors" if len(flat) < len(kinds) else "nearly the same intensity"
-        if any(kind == Data.POSITIONS and one_color(obj, frame) is not None for obj, kind in kinds.items()):
+        what = "nearly the same intensity" if all(each.flat for each in chosen.values()) else "no colors"
+        if any(each.kind == Data.POSITIONS and each.color is not None for each in chosen.values()):
             what = "only one color"
         scene.patina.style.chosen = PLASTER
         said.append(f"The points have {what}: the style Plaster lights them")
-    for obj, kind in kinds.items():
-        if kind == Data.INTENSITY:
-            said.append(_show_intensity(obj, frame))
-        elif kind == Data.CLASSES:
+    for obj, each in chosen.items():
+        if each.kind == Data.INTENSITY:
+            said.append(_show_intensity(obj, each.flat, frame))
+        elif each.kind == Data.CLASSES:
             name = next(name for name in attributes.CLASS_NAMES if name in obj.data.attributes)
             coloring.apply(obj, coloring.Choice("Class", 'SCALAR', name, 'CLASSES'), frame)
             said.append(f"'{obj.name}' is colored by its classes")
-        elif kind == Data.POSITIONS and not plaster:
-            said += filter(None, [_light_one_color(obj, one_color(obj, frame))])
-    if not plaster and any(kind != Data.POSITIONS for kind in kinds.values()) and view_transform.changes_colors(scene):
+        elif each.kind == Data.POSITIONS and not plaster:
+            said += filter(None, [_light_one_color(obj, each.color)])
+    if not plaster and any(each.kind != Data.POSITIONS for each in chosen.values()) and view_transform.changes_colors(scene):
         bpy.ops.render.patina_true_colors()
         said.append("The view transform is Standard, which shows the colors as they were taken")
     return said
 
 
-def _data(obj: Object, frame: int) -> Data:
+def _data(obj: Object, frame: int) -> Found:
     try:
         return data_of(obj, frame)
     except native.PatinaError:
-        return Data.COLORS  # the viewport reports the file
+        return Found(Data.COLORS)  # the viewport reports the file
 
 
-def _is_flat(obj: Object) -> bool:
-    """Whether most points have nearly the same intensity, which no stretch tells apart: scanners cut off what is too bright for them."""
-    with attributes.readable(obj) as data:
-        spread = _intensities(data, point_data.count_of(data))
-    return spread is not None and spread[1] < FLAT
-
-
-def _show_intensity(obj: Object, frame: int) -> str:
+def _show_intensity(obj: Object, flat: bool, frame: int) -> str:
     name = attributes.intensity_name(obj.data)
-    if obj.patina.lighting == 'AUTO' and _is_flat(obj):
+    if obj.patina.lighting == 'AUTO' and flat:
         obj.patina.lighting = 'LIT'
     coloring.apply(obj, coloring.Choice("Intensity", 'SCALAR', name, 'GREY'), frame)
     group = obj.patina.colors
@@ -166,9 +158,9 @@ def color_imported(obj: Object, frame: int, cloud: native.Cloud | None = None) -
     black in the scene. cloud: of a linked file. Returns what was done, or ""."""
     if obj.patina.colors.source != 'OWN':
         return ""
-    kind = Data.POSITIONS if cloud else _data(obj, frame)
-    if kind == Data.INTENSITY:
-        return _show_intensity(obj, frame)
-    if kind == Data.COLORS or add_light.is_dark(bpy.context.scene):
+    found = _of_cloud(cloud) if cloud else _data(obj, frame)
+    if found.kind == Data.INTENSITY:
+        return _show_intensity(obj, found.flat, frame)
+    if found.kind == Data.COLORS or add_light.is_dark(bpy.context.scene):
         return ""
-    return _light_one_color(obj, _shared(cloud) if cloud else one_color(obj, frame))
+    return _light_one_color(obj, found.color)

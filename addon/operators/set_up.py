@@ -88,11 +88,11 @@ def apply(context: Context, points: Sequence[Object]) -> list[str]:
     for obj in context.view_layer.objects:
         obj.select_set(obj in points)
     said = _frame(context, points, fresh) if scene.camera else []
-    kinds = first_look.kinds_of(scene, points)
-    said += first_look.choose(scene, kinds)
+    found = first_look.found_in(scene, points)
+    said += first_look.choose(scene, found)
     if unlit(scene, points):
         scene.patina.studio.use_headlight = True
-        lit = any(first_look.is_lit(obj, kind) for obj, kind in kinds.items())
+        lit = any(first_look.is_lit(obj, each.kind) for obj, each in found.items())
         said.append("No light reaches the points. Enabled the headlight" if lit else
                     "Enabled the headlight for color ramps and lit styles. The points' own colors are shown without light")
     return said

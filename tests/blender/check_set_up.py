@@ -226,7 +226,7 @@ def test_first_look_of_intensity_says_the_range():
     from patina.operators import first_look
     start_scene()
     obj, = import_ply(write_ply("first_range.ply", columns_of(1.0, intensity=lambda points: 30000 + 20000 * points[:, 2])))
-    said, = (text for text in first_look.choose(bpy.context.scene, first_look.kinds_of(bpy.context.scene, [obj])) if "intensity" in text)
+    said, = (text for text in first_look.choose(bpy.context.scene, first_look.found_in(bpy.context.scene, [obj])) if "intensity" in text)
     group = obj.patina.colors
     check(said == f"'first_range' is colored by 'intensity', stretched from {group.range_min:,.6g} to {group.range_max:,.6g}", said)
 
