@@ -11,6 +11,7 @@ from ..properties.drawings import KINDS
 from ..sync import drawings as kept
 from ..sync.drawings import DrawingError
 from . import rows
+from .statistics import SidebarPanel
 
 ICONS = {'PLAN': 'AXIS_TOP', 'ELEVATION': 'AXIS_FRONT', 'SECTION': 'MOD_BOOLEAN', 'CEILING': 'MOD_MIRROR'}
 _NEW = ((drawings.PATINA_OT_add_drawing, 'VIEW', "Current View"), (drawings.PATINA_OT_pick_drawing, 'WALL', "Wall"),
@@ -18,10 +19,7 @@ _NEW = ((drawings.PATINA_OT_add_drawing, 'VIEW', "Current View"), (drawings.PATI
         (drawings.PATINA_OT_add_drawing, 'PLAN', "Plan"), (drawings.PATINA_OT_add_drawing, 'CEILING', "Ceiling Plan"))
 
 
-class PATINA_PT_drawings(Panel):
-    bl_space_type = 'VIEW_3D'
-    bl_region_type = 'UI'
-    bl_category = "Patina"
+class PATINA_PT_drawings(SidebarPanel, Panel):
     bl_label = "Survey Drawings"
     bl_order = 3
     bl_options = {'DEFAULT_CLOSED'}

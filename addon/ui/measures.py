@@ -13,6 +13,7 @@ from ..properties.measures import KINDS
 from ..sync import measures as kept
 from ..sync.measures import MeasureError
 from . import rows
+from .statistics import SidebarPanel
 
 ICONS = {item[0]: item[3] for item in KINDS}
 
@@ -32,10 +33,7 @@ class PATINA_UL_measures(UIList):
         row.prop(item, "hide", text="", emboss=False, icon='HIDE_ON' if item.hide else 'HIDE_OFF')
 
 
-class PATINA_PT_measures(Panel):
-    bl_space_type = 'VIEW_3D'
-    bl_region_type = 'UI'
-    bl_category = "Patina"
+class PATINA_PT_measures(SidebarPanel, Panel):
     bl_label = "Measurements"
     bl_order = 2
     bl_options = {'DEFAULT_CLOSED'}

@@ -21,6 +21,8 @@ def expected_text(expected: dict[str, float]) -> str:
 
 
 class SidebarPanel:
+    """In the sidebar's tab Patina. Shown while Patina is the engine, unless a panel has a poll of its own."""
+
     bl_space_type = 'VIEW_3D'
     bl_region_type = 'UI'
     bl_category = "Patina"
@@ -30,10 +32,7 @@ class SidebarPanel:
         return context.engine == PatinaRenderEngine.bl_idname
 
 
-class PATINA_PT_sidebar_set_up(Panel):
-    bl_space_type = 'VIEW_3D'
-    bl_region_type = 'UI'
-    bl_category = "Patina"
+class PATINA_PT_sidebar_set_up(SidebarPanel, Panel):
     bl_label = "Set Up"
 
     @classmethod
