@@ -55,7 +55,8 @@ void draw_pixel(facet f, int x, int y, uint id)
     }
     uint z_bits = pt_bits(z) & 0x7FFFFFFFu;
 #if PASS == 0
-    atomicMin(keys[2u * pixel + 1u], z_bits);
+    if (z_bits < keys[2u * pixel + 1u] && z_bits < atomicMin(keys[2u * pixel + 1u], z_bits))
+        keys[2u * pixel] = PT_KEY_EMPTY_ID; // that of a mesh before, farther off: all who come here write this
 #else
     if (keys[2u * pixel + 1u] == z_bits)
         atomicMin(keys[2u * pixel], id);

@@ -39,16 +39,27 @@ static struct soup soup(struct harness *h, struct view_args view, uint32_t trian
     return s;
 }
 
-static uint64_t *run(struct harness *h, const struct soup *s, const float *limit)
+static void run_over(struct harness *h, const struct soup *s, const float *limit, struct pt_buffer *keys)
 {
     size_t pixels = (size_t)s->args.view.width * s->args.view.height, corners = 3 * (size_t)s->args.mesh.id_count;
-    uint64_t *empty = harness_alloc(h, pixels * 8);
-    for (size_t i = 0; i < pixels; i++)
-        empty[i] = REF_EMPTY_KEY;
-    struct pt_buffer *keys = harness_buffer(h, empty, pixels * 8);
     struct pt_buffer *vertices = harness_buffer(h, s->vertices, corners * 12);
     struct pt_buffer *indices = harness_buffer(h, s->indices, corners * 4);
     HARNESS_RUN(h, raster, &s->args, keys, vertices, indices, NULL, limit ? harness_buffer(h, limit, pixels * 4) : NULL);
+}
+
+static struct pt_buffer *empty_keys(struct harness *h, const struct view_args *view)
+{
+    size_t pixels = (size_t)view->width * view->height;
+    uint64_t *empty = harness_alloc(h, pixels * 8);
+    for (size_t i = 0; i < pixels; i++)
+        empty[i] = REF_EMPTY_KEY;
+    return harness_buffer(h, empty, pixels * 8);
+}
+
+static uint64_t *run(struct harness *h, const struct soup *s, const float *limit)
+{
+    struct pt_buffer *keys = empty_keys(h, &s->args.view);
+    run_over(h, s, limit, keys);
     return harness_read(h, keys);
 }
 
@@ -133,6 +144,35 @@ static void behind(struct harness *h)
     for (size_t i = 0; i < 61 * 43; i++)
         limit[i] = rng_below(&rng, 4) ? (float)rng_range(&rng, 3.0, 7.0) : (float)INFINITY;
     check(h, &s, limit, TOL_UNSURE_SHARE);
+}
+
+// Two meshes, in both orders: the nearer triangle shows, whichever number it has.
+static void one_after_another(struct harness *h)
+{
+    struct rng rng = {5};
+    struct soup soups[2] = {soup(h, picture_view(61, 43, 1), 40), soup(h, picture_view(61, 43, 1), 40)};
+    uint64_t *alone[2];
+    soups[1].args.mesh.id_base += soups[0].args.mesh.id_count;
+    for (int i = 0; i < 2; i++) {
+        scatter_triangles(&rng, &soups[i], 1.0, 2.0);
+        alone[i] = run(h, &soups[i], NULL);
+    }
+    for (int first = 0; first < 2; first++) {
+        struct pt_buffer *keys = empty_keys(h, &soups[0].args.view);
+        run_over(h, &soups[first], NULL, keys);
+        run_over(h, &soups[1 - first], NULL, keys);
+        const uint64_t *got = harness_read(h, keys);
+        uint32_t nearer[2] = {0, 0};
+        for (int at = 0; at < 61 * 43; at++) {
+            const int which = alone[1][at] < alone[0][at];
+            nearer[which] += alone[0][at] != REF_EMPTY_KEY && alone[1][at] != REF_EMPTY_KEY;
+            if (got[at] != alone[which][at])
+                harness_fail(h, "key", at % 61, at / 61, "got %.9g of triangle %u, expected %.9g of %u", ref_key_z(got[at]),
+                             ref_key_id(got[at]), ref_key_z(alone[which][at]), ref_key_id(alone[which][at]));
+        }
+        if (nearer[0] < 100 || nearer[1] < 100)
+            harness_fail(h, "key", 0, 0, "%u and %u pixels in which each is before the other", nearer[0], nearer[1]);
+    }
 }
 
 // Nothing that is not a number, empty or beside the picture may draw or hang.
@@ -247,11 +287,9 @@ static void t_junction(struct harness *h)
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"triangles of all sizes", sizes, 0},
-        {"cut by the near plane and far outside", cut, 0},
-        {"behind a layer", behind, 0},
-        {"nothing to see", degenerate, 0},
-        {"shared edges are drawn once", shared_edges, 0},
+        {"triangles of all sizes", sizes, 0},   {"cut by the near plane and far outside", cut, 0},
+        {"behind a layer", behind, 0},          {"one mesh after another", one_after_another, 0},
+        {"nothing to see", degenerate, 0},      {"shared edges are drawn once", shared_edges, 0},
         {"a corner on an edge", t_junction, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
