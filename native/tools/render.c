@@ -329,17 +329,23 @@ static int draw_strips(struct job *job, const uint32_t region[4], uint32_t rows,
     return result;
 }
 
-// 0: there are none, and the message says so of the whole.
-static uint32_t rows_that_fit(struct job *job, const uint32_t region[4])
+// Of a strip: at most so many, and half of them as often as the memory or the device demands. 0: no strip fits, and the message says so of
+// the whole.
+static uint32_t rows_that_fit(struct job *job, const uint32_t region[4], uint32_t most)
 {
     const uint32_t height = region[3] - region[1];
     patina_settings settings = job->options.settings;
-    for (uint32_t rows = (height + 1) / 2; rows >= LEAST_STRIP; rows /= 2) {
+    uint32_t rows = most < height ? most : height;
+    for (;; rows /= 2) {
         // That in the middle needs most, for it has margins on both sides.
         const uint32_t low = region[1] + (height - rows) / 2;
         memcpy(settings.region, (uint32_t[]){region[0], low, region[2], low + rows}, sizeof settings.region);
-        if (!patina_scene_set_settings(job->scene, &settings) && !patina_frame_check(job->frame, job->scene))
+        int code = patina_scene_set_settings(job->scene, &settings);
+        code = code ? code : patina_frame_check(job->frame, job->scene);
+        if (code != PATINA_ERROR_TOO_LARGE) // what else is wrong, drawing says
             return rows;
+        if (rows / 2 < LEAST_STRIP)
+            break;
     }
     memcpy(settings.region, region, sizeof settings.region);
     patina_scene_set_settings(job->scene, &settings);
@@ -354,14 +360,16 @@ static int draw(struct job *job, double *ms)
     uint32_t region[4] = {0, 0, options->settings.width, options->settings.height};
     if (options->settings.region[2])
         memcpy(region, options->settings.region, sizeof region);
-    if (options->strip)
-        return draw_strips(job, region, options->strip, ms);
+    if (options->strip) {
+        const uint32_t fit = rows_that_fit(job, region, options->strip); // before the first is drawn
+        return fit ? draw_strips(job, region, fit, ms) : draw_failed(job, PATINA_ERROR_TOO_LARGE);
+    }
     const int code = try_region(job, region, ms);
     if (code != PATINA_ERROR_TOO_LARGE || !tool_may_strip(options) || job->parts->count)
         return draw_failed(job, code);
     free(job->pixels);
     job->pixels = NULL;
-    const uint32_t rows = rows_that_fit(job, region);
+    const uint32_t rows = rows_that_fit(job, region, (region[3] - region[1] + 1) / 2);
     if (!rows)
         return draw_failed(job, code);
     job->stripped = 1;

@@ -193,13 +193,13 @@ def needs_opengl():
 
 def test_small_blocks():
     """4096 x 4096 on OpenGL, where shaders may reach no more than 128 MiB of a plane, as in Mesa's software: strips give an image. Where points
-    are so far apart that no strip does, at this size or at 16384 x 16384, one message says so."""
+    are so far apart that no strip does, at this size or at 16384 x 16384, one message says so before any is drawn."""
     needs_opengl()
     code, _, said, _, _ = patina("render", some(), "-o", "blocks.png", "--size", "4096x4096", "--device", "gl-egl", *CLOSE, *FLAT)
     assert code == 0 and size_of("blocks.png") == (4096, 4096, True), said
-    for side in (4096, 16384):
+    for side, *strips in ((4096,), (16384,), (16384, "--strip", "256")):
         (SCRATCH / "sparse.png").unlink(missing_ok=True)
-        result = patina("render", some(), "-o", "sparse.png", "--size", f"{side}x{side}", "--device", "gl-egl", *FLAT)
+        result = patina("render", some(), "-o", "sparse.png", "--size", f"{side}x{side}", "--device", "gl-egl", *strips, *FLAT)
         if result[0] == 0:
             assert size_of("sparse.png") == (side, side, True)
         else:
