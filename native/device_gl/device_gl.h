@@ -102,7 +102,8 @@ struct pt_gl_device {
     GLuint srgb;    // uniform block: linear values of the 256 sRGB bytes
     uint32_t stamp; // fill: of the current step
     GLuint programs[PT_KERNEL_COUNT][PT_GL_VARIANTS];
-    char shade_definitions[PT_GL_VARIANTS][256]; // of shade's programs, shade_count of them
+    char shade_definitions[PT_GL_VARIANTS][256];     // of shade's programs, shade_count of them
+    uint64_t shade_used[PT_GL_VARIANTS], shade_uses; // number of the use that was its last, and of all
     uint32_t shade_count;
     GLuint tile_programs[2], list_program, clear_program;
     GLuint shown; // the key plane that PT_GL_SCRATCH_SHOWN is of, as long as no kernel writes planes; else 0

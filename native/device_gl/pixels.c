@@ -64,16 +64,20 @@ static void shade_definitions(const struct shade_args *args, int shading, char *
              args->directed && instance->lit, blend[args->blend < 2 ? args->blend : 2]);
 }
 
-// Variants are numbered as they come; beyond the last, it gives way.
+// Variants are numbered as they come; once there is no number left, the one that was not used for longest gives way.
 static int shade_program(struct pt_gl_device *d, const char *definitions, uint32_t *variant)
 {
     uint32_t v = 0;
     while (v < d->shade_count && strcmp(d->shade_definitions[v], definitions) != 0)
         v++;
     if (v == SHOWN) {
-        d->gl.DeleteProgram(d->programs[PT_KERNEL_shade][--v]);
+        v = 0;
+        for (uint32_t i = 1; i < SHOWN; i++)
+            v = d->shade_used[i] < d->shade_used[v] ? i : v;
+        d->gl.DeleteProgram(d->programs[PT_KERNEL_shade][v]);
         d->programs[PT_KERNEL_shade][v] = 0;
     }
+    d->shade_used[v] = ++d->shade_uses;
     snprintf(d->shade_definitions[v], sizeof d->shade_definitions[v], "%s", definitions);
     d->shade_count = v < d->shade_count ? d->shade_count : v + 1;
     *variant = v;
