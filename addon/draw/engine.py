@@ -112,11 +112,11 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
             finally:
                 if len(moments) > 1:
                     self._go_to(frame)
-        description, picture = data
-        picture.planes["COMBINED"] = color / np.float32(done) if done > 1 else color
-        layer, size = depsgraph.view_layer_eval, picture.planes["COMBINED"].shape[:2]
-        picture.planes.update(cryptomatte.planes(ranks, (item.plane for item in passes.enabled(layer)), size, 1.0 / done))
-        passes.write(self, layer, description, picture.planes, eye)
+            description, picture = data
+            picture.planes["COMBINED"] = color / np.float32(done) if done > 1 else color
+            layer, size = depsgraph.view_layer_eval, picture.planes["COMBINED"].shape[:2]
+            picture.planes.update(cryptomatte.planes(ranks, (item.plane for item in passes.enabled(layer)), size, 1.0 / done))
+            passes.write(self, layer, description, picture.planes, eye, shown)
         stopped = done < len(moments) or bool(picture.stats.get("pixel_pending"))
         summary = _summary(picture, ms, _kept(least, most, self._asked) if stopped else "")
         self._status(summary, 1.0)

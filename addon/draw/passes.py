@@ -218,13 +218,13 @@ class Shown:
 
 
 def write(engine: bpy.types.RenderEngine, layer: bpy.types.ViewLayer, scene: SceneDescription,
-          planes: dict[str, np.ndarray], eye: str = "") -> None:
-    """Hands the planes of a finished picture to Blender."""
+          planes: dict[str, np.ndarray], eye: str = "", begun: Shown | None = None) -> None:
+    """Hands the planes of a finished picture to Blender, and ends what was begun of it: Blender copies all passes at each end."""
     for kind in cryptomatte.KINDS:
         if getattr(layer, f"use_pass_cryptomatte_{kind.lower()}"):
             for name, value in cryptomatte.metadata(layer.name, kind, cryptomatte.names(scene, kind)).items():
                 engine.get_result().stamp_data_add_field(name, value)
-    with Shown(engine, layer, eye) as shown:
+    with begun or Shown(engine, layer, eye) as shown:
         shown.put(scene, planes, show=False)
 
 

@@ -81,8 +81,8 @@ def _record_status(self, text, progress):
     _status(self, text, progress)
 
 
-def _record_write(self, layer, scene, planes, eye=""):
-    _write(self, layer, scene, planes, eye)
+def _record_write(self, layer, scene, planes, eye="", begun=None):
+    _write(self, layer, scene, planes, eye, begun)
     written.append((eye, planes))
     result = self.get_result()  # what Blender holds now, not what we think we gave
     size = (result.resolution_y, result.resolution_x)
