@@ -151,9 +151,9 @@ struct usage usage_now(void)
                           .files = entries(folder),
                           .objects = (uint32_t)atomic_load(&alive)};
     FILE *file = fopen("/proc/self/statm", "r");
-    unsigned long long size, resident = 0;
-    if (file && fscanf(file, "%llu %llu", &size, &resident) == 2)
-        usage.resident = resident * (uint64_t)sysconf(_SC_PAGESIZE);
+    unsigned long long size, resident, shared; // the last: of files, as code that ran once, which the system may drop
+    if (file && fscanf(file, "%llu %llu %llu", &size, &resident, &shared) == 3)
+        usage.resident = (resident - shared) * (uint64_t)sysconf(_SC_PAGESIZE);
     if (file)
         fclose(file);
     return usage;
