@@ -112,7 +112,7 @@ def test_all_kinds_are_drawn():
     scene, obj = begin()
     add = bpy.ops.object.patina_add_measurement
     yield lambda: settled(COUNT)
-    before, shares = screenshot("kinds_none"), []
+    before, drawn = screenshot("kinds_none"), [0]
     for kind, places, middle in (('HEIGHT', "-1.5 1 0  -1 1 0.5", (-1.5, 1.0, 0.25)), ('ANGLE', "0.5 1 0  0 1 0  0 1.5 0", (0.25, 1.0, 0.0)),
                                  ('AREA', "-1 -1 0 0 -1 0 0 0 0 -1 0 0", (-1.0, -0.5, 0.0)), ('POINT', "1 -1 0", (1.0, -1.0, 0.0))):
         with override():
@@ -122,8 +122,8 @@ def test_all_kinds_are_drawn():
         x, y = (int(value) for value in pixel_of(middle))
         changed = np.abs(after - before)[y - 6:y + 7, x - 6:x + 7].max(axis=2) > 0.2
         check(changed.sum() > 5, f"{kind}: {changed.sum()} pixels changed at {x}, {y}")
-        shares.append(float((np.abs(after - before).max(axis=2) > 0.1).mean()))
-    check(shares == sorted(shares), f"each adds pixels: {shares}")
+        drawn.append(len(yellow(after)))  # of its color alone: Blender's own panels come and go
+        check(drawn[-1] > drawn[-2], f"{kind} adds no pixels: {drawn}")
     space = area().spaces[0]
     space.show_region_ui = True
     yield pause(0.3)
