@@ -3,9 +3,10 @@
 
     xvfb-run -a -s "-screen 0 1280x800x24" blender --enable-event-simulate --factory-startup --python tests/blender/test_window.py [-- NAME ...]
 
-NAME figures measures instead (figures.py), and frames (frame_figures.py); long_session and artist are for long_session.py. --some leaves out what neither Blender's version nor its
-graphics change (ONCE), --drawn runs only tests that look at what Blender's graphics drew (DRAWN): for a second backend. A test is a
-generator: it yields what it waits for, a function that says whether it has come.
+NAME figures measures instead (figures.py), and frames (frame_figures.py); long_session and artist are for long_session.py.
+--some leaves out what neither Blender's version nor its graphics change (ONCE). --drawn runs only tests that look at what Blender's graphics
+drew (DRAWN): for a second backend. --oldest runs these and ONCE. A test is a generator: it yields what it waits for, a function that says
+whether it has come.
 """
 
 import importlib
@@ -35,7 +36,8 @@ DRAWN = {"a_new_size_shows_no_stretched_picture", "box_in_the_view", "brush_in_t
          "what_changes_is_read", "what_is_left_out_shows_no_dots", "wide_points_hide_their_dots",
          "wide_points_leave_what_is_before_them"}
 # What an option runs, and how the results call these tests.
-CHOICES = {"--some": (lambda name: name not in ONCE, "window tests, those that depend on Blender's version"),
+CHOICES = {"--oldest": (lambda name: name in ONCE | DRAWN, "window tests of what Blender's graphics draw, and those that no version changes"),
+           "--some": (lambda name: name not in ONCE, "window tests, those that depend on Blender's version"),
            "--drawn": (lambda name: name in DRAWN, "window tests of what Blender's graphics draw")}
 
 
