@@ -29,7 +29,7 @@ COLUMNS, ROWS = 72, 12
 BAD = re.compile(r"error|warning|traceback|exception|fail|abort|segmentation|violation|not freed|leak", re.IGNORECASE)
 
 # The artist makes scans soft that have no classes, or not the attribute of a style: a render that says so is right.
-GOOD = re.compile(r"Info: |Warning: Patina: 'artist-\S+' has no (classes|attribute '\w+') to be soft by$|"
+GOOD = re.compile(r"Info: |Warning: Patina: 'artist-\S+' has no (classes|(point )?attribute '\w+') to be soft by$|"
                   r"Warning: Patina: 'artist-\S+': its file has no attribute '\w+' to take as scalar$|\d+ passed, 0 failed, 0 skipped$")
 
 
