@@ -9,7 +9,7 @@
 
 struct usage {
     uint64_t heap;     // bytes that malloc has given out
-    uint64_t resident; // bytes of the process in memory, after free memory went back to the system
+    uint64_t resident; // bytes of the process's own in memory, none of files, after free memory went back
     uint32_t handles, threads;
     uint32_t files;   // in the folder for temporary files
     uint32_t objects; // buffers, textures, programs, queries of OpenGL devices that usage_watch was told of

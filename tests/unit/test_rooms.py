@@ -28,7 +28,7 @@ class Rooms(unittest.TestCase):
         return done.returncode, done.stdout + done.stderr
 
     def refuses(self, name: str, line: str, *said: str) -> None:
-        """With this line at the file's end it fails and says all of `said`."""
+        """With this line at the file's end it fails and says all of `said`; without it, no more."""
         path = self.folder / name
         before = path.read_bytes()
         path.write_bytes(before + b"\n" + line.encode() + b"\n")
@@ -37,6 +37,7 @@ class Rooms(unittest.TestCase):
         for word in said:
             self.assertIn(word, text)
         path.write_bytes(before)
+        self.assertEqual(self.check()[0], 0)
 
     def test_nothing_is_wrong(self) -> None:
         code, text = self.check()
@@ -50,7 +51,6 @@ class Rooms(unittest.TestCase):
         for line in lines:
             self.refuses("addon/sync/points/clouds.py", line, "addon/sync/points/clouds.py:", "memory by its address", READER)
         self.refuses("python/patina_render/renders.py", "import ctypes", "python/patina_render/renders.py:", "memory by its address")
-        self.assertEqual(self.check()[0], 0, "without these lines nothing is wrong")
         number = len((self.folder / "addon/draw/viewport.py").read_text(encoding="utf-8").splitlines()) + 2
         self.refuses("addon/draw/viewport.py", "import ctypes", f"addon/draw/viewport.py:{number}:")
         for name in (READER, "addon/native/__init__.py"):
