@@ -36,13 +36,17 @@ static int add_page(struct pages *pages, const struct patina_cloud *cloud, uint3
 
 static int is_cancelled(const struct pages *pages) { return pages->how->cancel && atomic_load(pages->how->cancel); }
 
-static void look(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+static void check_pages(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct pages *pages = context;
+    const struct pt_check *how = pages->how;
     (void)thread;
-    for (uint32_t i = begin; i < end && !is_cancelled(pages); i++)
-        if (pt_page_check(pages->list[i].cloud, pages->list[i].chunk, pages->how->arrays))
+    for (uint32_t i = begin; i < end && !is_cancelled(pages); i++) {
+        if (pt_page_check(pages->list[i].cloud, pages->list[i].chunk, how->arrays))
             atomic_store(&pages->damaged, 1);
+        if (how->look)
+            how->look(how->context);
+    }
 }
 
 static int run(struct pages *pages, int error, uint64_t bytes)
@@ -51,7 +55,7 @@ static int run(struct pages *pages, int error, uint64_t bytes)
         struct pt_pool *pool = pages->count > 8 ? pt_pool_create(0, 0) : NULL;
         if (pages->how->make_room)
             pages->how->make_room(pages->how->context, bytes);
-        pt_parallel(pool, pages->count, 4, look, pages);
+        pt_parallel(pool, pages->count, 4, check_pages, pages);
         pt_pool_destroy(pool);
         error = is_cancelled(pages) ? PATINA_ERROR_CANCELLED : atomic_load(&pages->damaged) ? PT_AGAIN : PATINA_OK;
     }

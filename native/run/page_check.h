@@ -15,6 +15,7 @@ struct pt_check {
     uint32_t arrays;                                 // bits 1 << pt_array
     const atomic_int *cancel;                        // NULL: nothing stops it
     void (*make_room)(void *context, uint64_t more); // before so many bytes are read; NULL: there is some
+    void (*look)(void *context);                     // after each page, from any thread; NULL: none
     void *context;
 };
 

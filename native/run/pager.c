@@ -21,7 +21,8 @@ enum {
     HIDING_HOLDS = 2, // times what it reads: the system maps what lies beside it in the file, which is not of the same step
     LEAST = 64 << 20, // bytes, however little is free: less would be read over and over
     ROUNDS_A_CAP = 2, // the last round's pages and this one's
-    FULL_EIGHTHS = 7, // from here on all is given back: threads read on meanwhile
+    ROOM_OF = 8,      // of the cap are left free at least when all is given back, for threads read on meanwhile
+    ROOM = 32 << 20,  // or so much where half of it allows: Linux 6.18 maps a whole folio at one touch, up to 2 MB
     TAKEN = 50000,    // bytes a microsecond, that threads take at most of a file that lies in the system's memory
 };
 
@@ -148,12 +149,18 @@ static void make_room(struct pt_pager *pager, uint64_t more)
     atomic_fetch_add(&pager->returned, 1);
 }
 
+static uint64_t left_free(uint64_t cap)
+{
+    const uint64_t least = cap / ROOM_OF, most = cap / 2;
+    return ROOM < least ? least : ROOM < most ? ROOM : most;
+}
+
 // Of the device's threads: one looks, the others go on.
 static void look(void *context)
 {
     struct pt_pager *pager = context;
     if (pt_look_is_due(&pager->look))
-        make_room(pager, pager->cap / 8 * (8 - FULL_EIGHTHS));
+        make_room(pager, left_free(pager->cap));
 }
 
 // ---- damaged pages -------------------------------------------------------------------------------------------------------
@@ -166,7 +173,7 @@ static void make_room_for(void *pager, uint64_t more) { make_room(pager, more); 
 // What a pass walks of files: all of its lists, of which no more is held than of a pass in rounds.
 static int check_lists(struct pt_pager *pager, const struct pt_pass *pass, const struct pt_chunk_list *lists, uint32_t count)
 {
-    const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, make_room_for, pager};
+    const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, make_room_for, look, pager};
     const uint64_t most = pager->cap ? pager->round : UINT64_MAX;
     int found = PATINA_OK;
     for (struct pt_chunk_range range = {0}; found >= 0 && pt_next_range(lists, count, most, &range);) {
@@ -180,7 +187,7 @@ static int check_lists(struct pt_pager *pager, const struct pt_pass *pass, const
 
 static int check_clouds(const struct pt_pager *pager)
 {
-    const struct pt_check how = {UINT32_MAX, pager->cancel, NULL, NULL};
+    const struct pt_check how = {UINT32_MAX, pager->cancel, NULL, NULL, NULL};
     int found = PATINA_OK;
     for (uint32_t i = 0; i < pager->scene->cloud_count && found >= 0; i++) {
         const struct patina_cloud *cloud = pager->scene->instances[i].cloud;
@@ -378,7 +385,7 @@ static int run_range(const struct bound *bound, struct pt_buffer *const *whole, 
 // What is damaged of a range: where something is, all others are looked at too, for the picture is planned once more then.
 static int check_range(struct pt_pager *pager, const struct pt_pass *pass, const struct bound *bound, const struct drawn *drawn)
 {
-    const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, NULL, NULL};
+    const struct pt_check how = {looked_at(pager), pass->output ? NULL : pager->cancel, NULL, look, pager};
     const int found = pt_check_range(&how, drawn->lists, &drawn->range);
     const int more = found == PT_AGAIN ? check_lists(pager, pass, bound->all, bound->count) : PATINA_OK;
     return more < 0 ? more : found;
